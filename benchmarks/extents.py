@@ -95,7 +95,7 @@ def _touched(extension, obj, depsgraph, place, extent):
         )
     except ValueError:
         return None
-    touched = add_on.touch.touch_object.with_verification(touched)
+    touched = add_on.touch.touch_object.completed(touched)
     off = extension.core.height_error(touched.result, touched.surface)
     return touched.report | {"fit": touched.result.status}, off
 

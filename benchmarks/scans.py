@@ -173,7 +173,7 @@ def random_places(obj, count):
 
 def _report(extension, *place, **inputs):
     touch = extension.tactile_addon.touch.touch_object
-    return touch.with_verification(touch.touch(*place, **inputs)).report
+    return touch.completed(touch.touch(*place, **inputs)).report
 
 
 def _caption():

@@ -64,19 +64,8 @@ COMMANDS = {
     "map": Command("stability_map", patch_record.MAP_RECORD, _lines_of(map_table_rows), {"progress": True}),
 }
 # The operators take these options unchanged.
-PASSED_THROUGH = {
-    "location",
-    "outward",
-    "spacing",
-    "extent",
-    "step",
-    "noise",
-    "seed",
-    "method",
-    "weight",
-    "solver",
-}
-PASSED_THROUGH |= {"edge", "most", "tolerance", "unit", "point", "flip", "radius"}
+PLAIN = {"location", "outward", "spacing", "extent", "step", "noise", "seed", "method", "weight", "solver"}
+PLAIN |= {"edge", "most", "tolerance", "unit", "point", "flip", "radius"}
 # Operators would replace negative numbers by 0.
 NEVER_NEGATIVE = ("radius", "noise", "normal_std", "seed")
 
@@ -84,8 +73,8 @@ NEVER_NEGATIVE = ("radius", "noise", "normal_std", "seed")
 # The endings that --output may have.
 PATCH_FILES = (".blend", ".ply", ".json")
 MESH_FILES = (".blend", ".ply")
-OUTPUT_SUFFIXES = {"reconstruct": PATCH_FILES, "fit": PATCH_FILES, "table": (".csv",)}
-OUTPUT_SUFFIXES |= dict.fromkeys(("object", "join", "map"), MESH_FILES)
+KINDS = {"reconstruct": PATCH_FILES, "fit": PATCH_FILES, "table": (".csv",)}
+KINDS |= dict.fromkeys(("object", "join", "map"), MESH_FILES)
 
 
 def _require_numbers(options: argparse.Namespace) -> None:
@@ -99,9 +88,7 @@ def _require_numbers(options: argparse.Namespace) -> None:
 def _arguments(options: argparse.Namespace) -> dict[str, Any]:
     """The operator's arguments from the options."""
     _require_numbers(options)
-    given = {
-        name: value for name, value in vars(options).items() if name in PASSED_THROUGH and value is not None
-    }
+    given = {name: value for name, value in vars(options).items() if name in PLAIN and value is not None}
     if options.degree is not None:
         given["degree"] = 0 if options.degree == "auto" else int(options.degree)
     if options.normal_std is not None:
@@ -180,7 +167,7 @@ def _require_outputs(options: argparse.Namespace) -> None:
         taken[path.resolve()] = "writes"
         if not path.absolute().parent.is_dir():
             raise OSError(f'there is no folder "{path.parent}" to write "{path.name}" to')
-    kinds = OUTPUT_SUFFIXES[options.command]
+    kinds = KINDS[options.command]
     if "output" in outputs and options.output.suffix.lower() not in kinds:
         raise Misuse(f"--output: expected a file {' or '.join(kinds)}, got {options.output}")
     if "report" in outputs and options.report.suffix.lower() != ".html":

@@ -219,12 +219,12 @@ def faults():
     """What is wrong now, a list of sentences."""
     found = [fault for probe in probes() for fault in _faults_of(probe)]
     found += [f"{obj.name} has no user" for obj in bpy.data.objects if not obj.users]
-    found += [f"{obj.name} has lost its patch" for obj in bpy.data.objects if _is_orphan(obj)]
+    found += [f"{obj.name} has lost its patch" for obj in bpy.data.objects if _is_left(obj)]
     meshes = (mesh for mesh in bpy.data.meshes if "tactile_digest" in mesh)
     return found + [f"the mesh {mesh.name} has no user" for mesh in meshes if not mesh.users]
 
 
-def _is_orphan(obj):
+def _is_left(obj):
     return "tactile_contours" in obj and obj.parent is None
 
 
@@ -252,7 +252,7 @@ def _faults_of(probe):
         return faults
     if settings.message:
         return [*faults, f'{probe.name} says "{settings.message}", its patch {record["status"]}']
-    touched = sys.modules[f"{addon.__package__}.touch_again"].touch_probe(
+    touched = sys.modules[f"{addon.__package__}.touch_again"].touch_at(
         probe, bpy.context.evaluated_depsgraph_get(), complete=True
     )
     off = max(abs(touched.report[key] - record[key]) * radius for key in ("k1", "k2"))

@@ -94,7 +94,7 @@ class Options(Lengths):
             raise ValueError(
                 f"tilts: expected as many as there are planes, {len(self.azimuths)}, got {len(self.tilts)}"
             )
-        self._require_fits_plane()
+        self._rehearse()
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> "Options":
@@ -134,7 +134,7 @@ class Options(Lengths):
         """The numbers of the touches of a block."""
         return range(block * self.block, min((block + 1) * self.block, self.touches))
 
-    def _require_fits_plane(self) -> None:
+    def _rehearse(self) -> None:
         """Raises ValueError if not even a plane could be rebuilt from its own curves."""
         up, along = (0.0, 0.0, 1.0), np.linspace(-1.0, 1.0, 21)
         axes = [plane.axes(up) for plane in self.planes()]

@@ -14,7 +14,7 @@ from mathutils import Matrix
 
 from ... import core
 from ..probes import probe
-from ..probes.in_slices import Progress, SlicedOperator
+from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, target_object
 from ..scene import patch_record
 from ..touch.detached_mesh import DetachedMesh
@@ -112,7 +112,7 @@ def register_patch(
     return search.put(pose)
 
 
-class TACTILE_OT_register(SlicedOperator, bpy.types.Operator):
+class TACTILE_OT_register(InSlices, bpy.types.Operator):
     """Find where on a mesh the active patch belongs, by its contacts alone, and move it there"""
 
     bl_idname = "tactile.register"
@@ -140,12 +140,12 @@ class TACTILE_OT_register(SlicedOperator, bpy.types.Operator):
         )
 
     def _begin(self, context: bpy.types.Context) -> None:
-        patch = probe.patch_for(context.view_layer.objects.active)
+        patch = probe.patch_near(context.view_layer.objects.active)
         target = target_object(context, self.target or chosen_mesh(context, patch))
         self._search = Search(patch, target, context.evaluated_depsgraph_get())
         self._steps = self._search.steps()
 
-    def _progress(self) -> Progress:
+    def _done(self) -> Progress:
         return f'Looking for the patch on "{self._search.target}": {self._search.seconds:.0f} s', None
 
     def _finish(self, context: bpy.types.Context) -> Outcome:

@@ -10,12 +10,12 @@ import bpy
 from ..touch import units
 from ..touch.touch_report import TouchReport
 from ..touch.units import Unit
-from ..touch.wording import STATISTICS, csv_cell
+from ..touch.wording import SPREAD, cell
 
 # The results of core.verify, in the order of a table.
 VERIFIED = (
-    *("vertices", *(f"vertex_distance_{key}" for key in STATISTICS)),
-    *("contacts", *(f"contact_distance_{key}" for key in STATISTICS), "fit_error"),
+    *("vertices", *(f"vertex_distance_{key}" for key in SPREAD)),
+    *("contacts", *(f"contact_distance_{key}" for key in SPREAD), "fit_error"),
     *("extra_contours", "extra_points", "extra_fit_error"),
     *("total_absolute_curvature", "overlap"),
 )
@@ -47,8 +47,8 @@ def verification_columns(report: Mapping[str, Any]) -> list[tuple[str, Any]]:
     found = report["verification"]
     lengths = [key for key in VERIFIED if "distance" in key or "error" in key]
     return [
-        *((key, csv_cell(report[key])) for key in ("patch", "source", "status")),
-        ("target", csv_cell(found["target"])),
+        *((key, cell(report[key])) for key in ("patch", "source", "status")),
+        ("target", cell(found["target"])),
         *((f"{key} [unit of the file]" if key in lengths else key, found.get(key, "")) for key in VERIFIED),
     ]
 
@@ -60,7 +60,7 @@ def verification_table(found: Mapping[str, Any], unit: Unit) -> list[tuple[str, 
     def lengths(key: str) -> Iterator[str]:
         return (_length(found, f"{what}_distance_{key}", bare) for what in ("vertex", "contact"))
 
-    names = zip(("Mean", "Median", "Maximum", "RMS"), STATISTICS, strict=True)
+    names = zip(("Mean", "Median", "Maximum", "RMS"), SPREAD, strict=True)
     return [
         (f"in {symbol}" if symbol else "Distance", "Mesh", "Contacts"),
         *((name, *lengths(key)) for name, key in names),
@@ -79,4 +79,4 @@ def verification_rows(found: Mapping[str, Any], unit: Unit) -> list[tuple[str, s
 
 
 def _length(found: Mapping[str, Any], key: str, unit: Unit) -> str:
-    return units.format_quantity(found[key], 1, unit) if key in found else "–"
+    return units.say(found[key], 1, unit) if key in found else "–"

@@ -13,11 +13,11 @@ from ... import core
 from ...core.steps import result_of
 from ..probes import probe, touch_again
 from ..probes.change_handlers import is_pending
-from ..probes.in_slices import Progress, SlicedOperator
+from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, target_object
 from ..scene import attributes, mesh_data, patch_record, shown
 from ..touch.surface import MeshSurface
-from ..touch.touch_report import TouchReport, status_report
+from ..touch.touch_report import TouchReport, judgment
 from ..touch.types import Array, Object, Outcome
 from .verification_wording import verification_summary
 
@@ -45,7 +45,7 @@ class Verification:
         """Lets the steps go on in the scene as it is now. Raises ValueError if patch or mesh have changed."""
         patch, target = self._objects()
         # When Blender evaluates again, it frees what it has evaluated before.
-        self._surface = MeshSurface(target, depsgraph, vertices_checked=self._surface is not None)
+        self._surface = MeshSurface(target, depsgraph, sound=self._surface is not None)
         if _inputs(patch, target) != self._given:
             raise ValueError(
                 f'"{self.patch}" or "{self.target}" was changed while it was verified: start again'
@@ -84,7 +84,7 @@ class Verification:
         record["verification"] = {"target": self.target, **self._found}
         if record["status"] != "outdated":
             mean = self._found.get("vertex_distance_mean", 0.0)
-            record.update(status_report(r, mean, record["ended"], record.get("few_facets", False)))
+            record.update(judgment(r, mean, record["ended"], record.get("few_facets", False)))
         return record.to_dict()
 
     def _objects(self) -> tuple[Object, Object]:
@@ -119,7 +119,7 @@ def _vertices(mesh: bpy.types.Mesh, r: core.Reconstruction, scale: float) -> tup
     return points, r.geometry.normal(points[:, 0], points[:, 1])
 
 
-class TACTILE_OT_verify(SlicedOperator, bpy.types.Operator):
+class TACTILE_OT_verify(InSlices, bpy.types.Operator):
     """Measure how far the active patch is from the mesh it was touched on, or from another selected mesh"""
 
     bl_idname = "tactile.verify"
@@ -142,7 +142,7 @@ class TACTILE_OT_verify(SlicedOperator, bpy.types.Operator):
 
     def _begin(self, context: bpy.types.Context) -> None:
         obj = context.view_layer.objects.active
-        found, patch = probe.probe_of(obj), probe.patch_for(obj)
+        found, patch = probe.probe_of(obj), probe.patch_near(obj)
         if found is not None and is_pending(found):  # Completing it later would undo the verification.
             touch_again.refresh(found, context)
         target = target_object(context, self.target or chosen_mesh(context, patch))
@@ -152,14 +152,14 @@ class TACTILE_OT_verify(SlicedOperator, bpy.types.Operator):
     def _check(self, context: bpy.types.Context) -> None:
         self._verification.look(context.evaluated_depsgraph_get())
 
-    def _progress(self) -> Progress:
+    def _done(self) -> Progress:
         done, count = self._verification.done, self._verification.count
         share = done / count if count else None
         return f'Comparing with "{self._verification.target}": {done} of {count} vertices', share
 
     def _finish(self, context: bpy.types.Context) -> Outcome:
         record = self._verification.write()
-        probe.patch_for(context.view_layer.objects.active).tactile_colors = "deviation"
+        probe.patch_near(context.view_layer.objects.active).tactile_colors = "deviation"
         doubt, summary = verification_summary(record)
         self.report({"WARNING"} if doubt else {"INFO"}, summary)
         return {"FINISHED"}

@@ -18,10 +18,10 @@ from bpy.props import (
 from bpy_extras.io_utils import ImportHelper
 
 from ... import core
-from ..probes.in_slices import Progress, SlicedOperator
+from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import is_in_object_mode, make_active, report_error
 from ..scene import patch_object
-from ..touch.settings import FitSettings, draw_auto, draw_solver, length_property
+from ..touch.settings import FitSettings, draw_chosen, draw_solver, length_property
 from ..touch.types import Outcome
 from ..touch.units import length
 from ..touch.wording import fit_summary, many
@@ -40,7 +40,7 @@ UNIT_ITEMS = [
 ]
 
 
-class TACTILE_OT_import_contacts(SlicedOperator, FitSettings, bpy.types.Operator, ImportHelper):
+class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, ImportHelper):
     """Rebuild the surface patch, or the whole surface, that measured contours and strokes show"""
 
     bl_idname = "tactile.import_contacts"
@@ -163,7 +163,7 @@ class TACTILE_OT_import_contacts(SlicedOperator, FitSettings, bpy.types.Operator
         )
         self._steps = self._object.steps()
 
-    def _progress(self) -> Progress:
+    def _done(self) -> Progress:
         return f"Joining {many(len(self._paths), 'file', 'files')}", self._share
 
     def _finish(self, context: bpy.types.Context) -> Outcome:
@@ -185,7 +185,7 @@ class TACTILE_OT_import_contacts(SlicedOperator, FitSettings, bpy.types.Operator
         for name in ("unit", "whole", *(of_object if self.whole else of_patch)):
             layout.prop(self, name)
         if self.whole:
-            draw_auto(layout, self, "tolerance")
+            draw_chosen(layout, self, "tolerance")
         else:
             draw_solver(layout, self)
 

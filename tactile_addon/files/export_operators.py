@@ -31,7 +31,7 @@ class ObjectExport(ExportHelper, OperatorMixin):  # type: ignore[misc]  # of `in
     @staticmethod
     def written(context: bpy.types.Context) -> Object | None:
         """The object to write, or None."""
-        return probe.patch_for(context.view_layer.objects.active)
+        return probe.patch_near(context.view_layer.objects.active)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from ... import core
 from ...core.steps import part_of
 from ..touch.single_precision import require_single
-from ..touch.touch_object import TouchResult, reference_axes
+from ..touch.touch_object import Touched, reference_axes
 from ..touch.touch_report import TouchReport, measures, reconstruction_report, suggestion_report
 from ..touch.types import Array, Point
 from ..whole_object.whole_surface import WholeSurface
@@ -130,7 +130,7 @@ def fit(
     all_strokes: bool = False,
     radius: float = 0.0,
     **options: Any,
-) -> TouchResult:
+) -> Touched:
     """The patch that core.Contacts show, as a Touched without a surface.
 
     point : where the curves meet, exactly; None for the point of the file, or core.common_point. For strokes
@@ -162,7 +162,7 @@ def _fit(
     flip: bool,
     normal_std: float,
     options: dict[str, Any],
-) -> TouchResult:
+) -> Touched:
     start = perf_counter()
     contours, unit, of_file, up, strokes = contacts
     point = of_file if point is None else point
@@ -200,7 +200,7 @@ def _fit(
     if distances is not None:
         report["misses"] = distances.tolist()
     report["seconds"] = {"fit": perf_counter() - start}
-    return TouchResult(None, result, report)
+    return Touched(None, result, report)
 
 
 def _mean_normal(contours: Sequence[core.Contour]) -> Array:

@@ -79,7 +79,7 @@ def write(path: Path, obj: Object) -> None:
 
     Raises OSError with a sentence, as save_scene does; the old file is then as it was.
     """
-    with whole_file.atomic_path(path) as temporary:
+    with whole_file.replacing(path) as temporary:
         window = bpy.context.window_manager.windows[0]
         with bpy.context.temp_override(selected_objects=[obj], window=window):
             bpy.ops.wm.ply_export(
@@ -96,7 +96,7 @@ def write(path: Path, obj: Object) -> None:
 
 def save_scene(path: Path) -> None:
     """Writes the open scene as .blend."""
-    with whole_file.atomic_path(path) as temporary:
+    with whole_file.replacing(path) as temporary:
         try:
             bpy.ops.wm.save_as_mainfile(filepath=str(temporary), copy=True)
         except RuntimeError as error:  # If the disk is full, Blender says that there is no such file.

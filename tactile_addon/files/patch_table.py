@@ -15,7 +15,7 @@ from ..scene import patch_record
 from ..touch import units
 from ..touch.types import Object
 from ..touch.units import Unit
-from ..touch.wording import csv_cell
+from ..touch.wording import cell
 from . import whole_file
 
 # Keys of the report, and the power of length in the unit of each.
@@ -33,7 +33,7 @@ WORD_COLUMNS = ("source", "method", "status", "message")
 
 def patches_of(objects: Iterable[Object]) -> list[Object]:
     """The patches among objects, or that belong to probes and contours among them, by name."""
-    patches = {probe.patch_for(obj) for obj in objects} - {None}
+    patches = {probe.patch_near(obj) for obj in objects} - {None}
     return sorted((patch for patch in patches if probe.record_of(patch) is not None), key=lambda p: p.name)
 
 
@@ -58,12 +58,12 @@ def write(path: str | Path, patches: Sequence[Object], scene: bpy.types.Scene) -
 def _row(patch: Object, record: Mapping[str, Any], unit: Unit) -> dict[str, str]:
     """The row of a patch as a dict of headings and values."""
     owner = probe.probe_of(patch)
-    named = {"probe": csv_cell(owner.name) if owner else "", "patch": csv_cell(patch.name)}
+    named = {"probe": cell(owner.name) if owner else "", "patch": cell(patch.name)}
     try:
         with patch_record.reading(patch):
-            return named | _numbers(record, unit) | {key: csv_cell(record[key]) for key in WORD_COLUMNS}
+            return named | _numbers(record, unit) | {key: cell(record[key]) for key in WORD_COLUMNS}
     except ValueError as error:
-        return named | {"message": csv_cell(str(error))}
+        return named | {"message": cell(str(error))}
 
 
 def _numbers(record: Mapping[str, Any], unit: Unit) -> dict[str, str]:

@@ -15,7 +15,7 @@ STALE = 3600.0  # Whoever has not written to such a file for so many seconds was
 
 
 @contextmanager
-def atomic_path(path: str | Path) -> Iterator[Path]:
+def replacing(path: str | Path) -> Iterator[Path]:
     """The path of a file that replaces `path` once it is written, at the end of the block.
 
     Raises OSError, with a sentence, if that fails. The old file is then as it was, and nothing is beside it.
@@ -58,5 +58,5 @@ def _sweep(folder: Path, start: str, end: str) -> None:
 
 def write_text(path: str | Path, text: str) -> None:
     """Writes a text in UTF-8, with line ends as they are, as the file `path`."""
-    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         file.write(text)

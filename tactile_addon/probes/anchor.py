@@ -50,7 +50,7 @@ def can_have_children(probe: Object) -> bool:
     return all(0.0 < abs(scale) < math.inf for scale in probe.matrix_world.to_scale())
 
 
-def set_probe_matrix(probe: Object, matrix: Matrix) -> None:
+def put(probe: Object, matrix: Matrix) -> None:
     """Puts the probe at a matrix of the world."""
     if is_attached(probe):
         patch_record.place(probe, matrix)
@@ -67,7 +67,7 @@ def is_carried(probe: Object) -> bool:
 
 
 @np.errstate(all="ignore")  # Objects may be beyond all numbers.
-def bake_world_transform(probe: Object, extent: float) -> None:
+def settle(probe: Object, extent: float) -> None:
     """Makes the world's coordinates the probe's own again, without the target's scale and shear."""
     if not is_carried(probe):
         return
@@ -116,7 +116,7 @@ def _seat(*matrices: float) -> Array:
     return np.concatenate([at, *axes, [np.log(size), np.sign(volume)], shape.ravel() / size**2])
 
 
-def store_transforms(probe: Object, patch: Object) -> None:
+def keep(probe: Object, patch: Object) -> None:
     """Keeps where the probe's target is in a patch that was touched just now."""
     target = probe.tactile_probe.target
     axes, origin = patch_record.touched_frame(patch)
@@ -124,7 +124,7 @@ def store_transforms(probe: Object, patch: Object) -> None:
 
 
 @np.errstate(all="ignore")  # Objects may be beyond all numbers.
-def follow_target(probe: Object, patch: Object) -> None:
+def carry(probe: Object, patch: Object) -> None:
     """Moves the patch in its record as its target was moved since.
 
     It does nothing if the probe was left behind because it is no child of the target.
@@ -148,7 +148,7 @@ def follow_target(probe: Object, patch: Object) -> None:
     if not np.isfinite(motion).all():
         return
     origin = motion[:3, :3] @ frame[:3, 3] + motion[:3, 3]
-    patch_record.set_record_frame(patch, turn @ frame[:3, :3], origin)
+    patch_record.move_record(patch, turn @ frame[:3, :3], origin)
 
 
 def _numbers(matrix: Matrix | Array) -> list[float]:

@@ -16,19 +16,19 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..scene import undo
-from ..scene.family import cached_children
+from ..scene.family import remembered
 from ..scene.viewports import has_gesture
-from ..touch.settings import forget_last_settings
+from ..touch.settings import something_happened
 from ..touch.types import Object
 from . import anchor, deleted
-from .probe import forget_targets, is_probe, probe_of, record_of, targets, why_locked
-from .touch_again import is_outdated, keep_patch, may_be_outdated, update, update_checksum
+from .probe import forget_targets, is_probe, lock_of, probe_of, record_of, targets
+from .touch_again import is_outdated, may_be_outdated, measure_shape, stand_by, update
 
-GESTURE_TIMEOUT = 0.25  # A gesture counts as ended after so many seconds without a change.
+SETTLE = 0.25  # A gesture counts as ended after so many seconds without a change.
 EVENT_SLICE = 0.2  # In a window, work between two events takes so many seconds.
 CHEAP = 0.05  # A touch that takes no more seconds is made in every frame of an animation.
 
-_check_all = True  # Whether any patch may differ from what its inputs ask for, as after undo.
+_unsure = True  # Whether any patch may differ from what its inputs ask for, as after undo.
 _seen = None  # The scene and view layer that were looked at last.
 
 
@@ -46,19 +46,19 @@ def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> N
 
 def _bring_up_to_date(depsgraph: bpy.types.Depsgraph, dearest: float) -> None:
     """Touches again if the last touch took at most `dearest` seconds; other patches say "outdated"."""
-    global _check_all
-    forget_last_settings()
-    if not (targets() or deleted.contour_owners or _check_all):
+    global _unsure
+    something_happened()
+    if not (targets() or deleted.contour_owners or _unsure):
         return
     if depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
         return
-    if _check_all or _has_come_or_gone(depsgraph):
-        deleted.find_orphan_contours()
+    if _unsure or _has_come_or_gone(depsgraph):
+        deleted.look_for_contours()
     if not targets():
-        _check_all = False
+        _unsure = False
         return
-    with cached_children(), undo.outside_undo_step():
-        concerned, unsure = _affected_probes(depsgraph)
+    with remembered(), undo.after_step():
+        concerned, unsure = _concerned(depsgraph)
         if not concerned:
             return
         reshaped: dict[Any, int | None] = {
@@ -67,9 +67,9 @@ def _bring_up_to_date(depsgraph: bpy.types.Depsgraph, dearest: float) -> None:
         if unsure:  # It may have been edited when no handler was told, as while the extension was off.
             reshaped |= {probe.tactile_probe.target: None for probe in concerned}
         end = perf_counter() + EVENT_SLICE
-        for probe in (probe for probe in concerned if why_locked(probe) is None):
+        for probe in (probe for probe in concerned if lock_of(probe) is None):
             in_time = bpy.app.background or (perf_counter() < end and _seconds(probe) <= dearest)
-            _update_probe(probe, depsgraph, reshaped, in_time)
+            _look_at(probe, depsgraph, reshaped, in_time)
 
 
 def _seconds(probe: Object) -> float:
@@ -78,19 +78,19 @@ def _seconds(probe: Object) -> float:
     return 0.0 if record is None else sum(record["seconds"].get(key, 0.0) for key in ("prepare", "touch"))
 
 
-def _update_probe(
+def _look_at(
     probe: Object, depsgraph: bpy.types.Depsgraph, reshaped: dict[Any, int | None], in_time: bool
 ) -> None:
     """Brings a probe up to date, or notes it for the end of the gesture if there is no time now."""
     settings = probe.tactile_probe
     deleted.relink(probe)
     deleted.forget_target(probe)
-    update_checksum(settings, depsgraph, reshaped)
+    measure_shape(settings, depsgraph, reshaped)
     outdated = is_outdated(probe, depsgraph)
     if outdated and settings.live and in_time:
         update(probe, depsgraph, complete=bpy.app.background)
     else:
-        keep_patch(probe, outdated, complete=bpy.app.background)
+        stand_by(probe, outdated, complete=bpy.app.background)
     late = outdated and settings.live and not in_time
     if not bpy.app.background and (late or is_pending(probe) or anchor.is_carried(probe)):
         _settle_soon()
@@ -108,9 +108,9 @@ def on_blend_import(imported: Any) -> None:
 @persistent
 def on_other_data(*_: Any) -> None:
     """Notes that after undo, or when a file was opened, any probe may be there and any patch may differ."""
-    global _check_all
+    global _unsure
     forget_targets()
-    _check_all = True
+    _unsure = True
     if not bpy.app.background:  # There may be no update otherwise.
         _settle_soon()
 
@@ -120,14 +120,14 @@ def _has_come_or_gone(depsgraph: bpy.types.Depsgraph) -> bool:
     return any(isinstance(u.id, bpy.types.Scene | bpy.types.Collection) for u in depsgraph.updates)
 
 
-def _affected_probes(depsgraph: bpy.types.Depsgraph) -> tuple[list[Object], bool]:
+def _concerned(depsgraph: bpy.types.Depsgraph) -> tuple[list[Object], bool]:
     """The probes to which something has happened: to them, to their patch or target, or to what is there.
 
     Also returns whether anything may have happened to any of them, as after undo or in a new scene.
     """
-    global _check_all, _seen
+    global _unsure, _seen
     layer = depsgraph.scene.session_uid, depsgraph.view_layer.name
-    updates, known, unsure = depsgraph.updates, targets(), _check_all or layer != _seen
+    updates, known, unsure = depsgraph.updates, targets(), _unsure or layer != _seen
     updated = {u.id.original for u in updates if u.is_updated_geometry or u.is_updated_transform}
     objects = [datablock for datablock in updated if isinstance(datablock, bpy.types.Object)]
     owners = {probe_of(obj) for obj in objects} - {None}
@@ -137,7 +137,7 @@ def _affected_probes(depsgraph: bpy.types.Depsgraph) -> tuple[list[Object], bool
     scene = unsure or _has_come_or_gone(depsgraph)
     if not (scene or owners or len(named) > len(objects) or any(o.session_uid in known for o in objects)):
         return [], False
-    _check_all, _seen = False, layer
+    _unsure, _seen = False, layer
     there: set[Object] = set(depsgraph.view_layer.objects)
     found = [obj for obj in there if is_probe(obj)]
     if scene and not found:
@@ -163,34 +163,34 @@ def is_pending(probe: Object) -> bool:
 
 
 def _settle_soon() -> None:
-    if bpy.app.timers.is_registered(_complete_pending):
-        bpy.app.timers.unregister(_complete_pending)
-    bpy.app.timers.register(_complete_pending, first_interval=GESTURE_TIMEOUT)
+    if bpy.app.timers.is_registered(_settle):
+        bpy.app.timers.unregister(_settle)
+    bpy.app.timers.register(_settle, first_interval=SETTLE)
 
 
-def _complete_pending() -> float | None:
+def _settle() -> float | None:
     """Completes the patches of a gesture once it has ended, some at a time; Blender calls it as a timer."""
     if not targets():
         return None
     if bpy.app.is_job_running("RENDER") or has_gesture():
-        return GESTURE_TIMEOUT
+        return SETTLE
     end = perf_counter() + EVENT_SLICE
     for window in bpy.context.window_manager.windows:
-        with bpy.context.temp_override(window=window), cached_children(), undo.outside_undo_step():
+        with bpy.context.temp_override(window=window), remembered(), undo.after_step():
             depsgraph = bpy.context.evaluated_depsgraph_get()
-            if _check_all:
+            if _unsure:
                 on_depsgraph_update(window.scene, depsgraph)
             objects: list[Object] = list(window.view_layer.objects)
             for probe in filter(is_probe, objects):
                 late = probe.tactile_probe.live and is_outdated(probe, depsgraph)
-                if why_locked(probe) is not None:
+                if lock_of(probe) is not None:
                     continue
                 if late or is_pending(probe):
                     update(probe, depsgraph, complete=True)
                     if perf_counter() > end:
                         return 0.01
                 else:
-                    keep_patch(probe, is_outdated(probe, depsgraph), complete=True)
+                    stand_by(probe, is_outdated(probe, depsgraph), complete=True)
     return None
 
 
@@ -220,7 +220,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    for timer in filter(bpy.app.timers.is_registered, (_complete_pending, deleted.remove)):
+    for timer in filter(bpy.app.timers.is_registered, (_settle, deleted.remove)):
         bpy.app.timers.unregister(timer)
     for name, handler in HANDLERS.items():
         with suppress(ValueError):  # Another script may have removed it.

@@ -9,7 +9,7 @@ import bpy
 
 from ..scene import patch_object, patch_record
 from ..scene.viewports import has_gesture
-from ..touch.settings import without_updates
+from ..touch.settings import silent
 from ..touch.types import Object
 from . import anchor
 from .probe import DIGEST, is_result
@@ -61,7 +61,7 @@ def _follow(probe: Object, target: Object) -> None:
     if found is None:
         return
     was_attached = anchor.is_attached(probe)
-    with without_updates():
+    with silent():
         probe.tactile_probe.target = found
     if was_attached:
         anchor.attach(probe, found)
@@ -82,23 +82,23 @@ def relink(probe: Object) -> None:
     number, was_attached, name = settings.lost.split(" ", 2)
     target: Object = bpy.data.objects.get(name)
     if target is not None and str(target.session_uid) == number and target.users_scene:
-        with without_updates():
+        with silent():
             settings.target = target
         if int(was_attached) and probe.parent is None:
             anchor.attach(probe, target)
 
 
-def find_orphan_contours() -> None:
+def look_for_contours() -> None:
     """Deletes contours whose patch was deleted, because without its coordinates they mean nothing."""
     there: dict[int, Object] = {obj.session_uid: obj for obj in bpy.data.objects}
     for number, obj in there.items():
         if patch_record.CONTOURS in obj and obj.parent is not None:
             contour_owners[number] = obj.parent.session_uid
-    if any(_is_orphan(obj, there) for obj in there.values()) or _unused_meshes():
+    if any(_is_left(obj, there) for obj in there.values()) or _unused_meshes():
         _remove_soon()
 
 
-def _is_orphan(obj: Object, there: dict[int, Object]) -> bool:
+def _is_left(obj: Object, there: dict[int, Object]) -> bool:
     """Whether an object is contours whose patch was deleted."""
     owner = contour_owners.get(obj.session_uid)
     return owner is not None and owner not in there and obj.parent is None and obj.is_editable
@@ -119,7 +119,7 @@ def remove() -> float | None:
     # would then bring back the object, but not these links.
     pointing = bpy.data.user_map(subset=gone) if gone else {}
     gone = [obj for obj in gone if all(isinstance(user, WINDOW_DATA) for user in pointing.get(obj, ()))]
-    left = [obj for obj in there.values() if _is_orphan(obj, there) and is_result(obj)]
+    left = [obj for obj in there.values() if _is_left(obj, there) and is_result(obj)]
     _deleted.clear()
     patch_object.remove_objects(left)
     for obj in gone:

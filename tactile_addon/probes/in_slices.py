@@ -22,12 +22,12 @@ SAY = 1.0  # Without a window, a line of progress is printed each time.
 Progress: TypeAlias = tuple[str, float | None]  # Words, and the share that is done, if it is known.
 
 
-class SlicedOperator(OperatorMixin):
+class InSlices(OperatorMixin):
     """For operators whose work is a generator to inherit.
 
     Each has `_begin(context)`, which sets `_steps`; `_check(context)`, called before each slice, because the
     scene may have changed; `_done()`, which gives words and the share that is done, or None; and
-    `_finish(context)`. All but `_progress` may raise ValueError, with a sentence for the user.
+    `_finish(context)`. All but `_done` may raise ValueError, with a sentence for the user.
     """
 
     progress: BoolProperty(
@@ -41,10 +41,10 @@ class SlicedOperator(OperatorMixin):
     _steps: Iterator[Any]
     _share: Any = 0.0  # What the steps yielded last: the share that is done, if they yield that.
     _begin: Callable[[bpy.types.Context], None]
-    _progress: Callable[[], Progress]
+    _done: Callable[[], Progress]
     _finish: Callable[[bpy.types.Context], Outcome]
     _timer: bpy.types.Timer | None = None  # There is one while it runs in a window.
-    _last_slice_end = 0.0  # When the last slice ended.
+    _worked = 0.0  # When the last slice ended.
     _in_window = False  # Whether a dialog was confirmed, after which it goes on in slices.
     stop = "Stop"  # What Esc does,
     stopped = "Stopped: the patch stays as it was"  # and what is reported then.
@@ -59,7 +59,7 @@ class SlicedOperator(OperatorMixin):
             return report_error(self, error)
         return self._go_on(context)
 
-    def _confirm(self, context: bpy.types.Context) -> Outcome:
+    def _ask(self, context: bpy.types.Context) -> Outcome:
         """Asks in a dialog that names the mesh to touch before it begins."""
         if bpy.app.background:
             return self.execute(context)
@@ -81,7 +81,7 @@ class SlicedOperator(OperatorMixin):
                 self._share = share
                 if self.progress and perf_counter() > said + SAY:
                     said = perf_counter()
-                    print(self._progress()[0], file=sys.stderr, flush=True)
+                    print(self._done()[0], file=sys.stderr, flush=True)
             return self._finish(context)
         except ValueError as error:
             return report_error(self, error)
@@ -89,7 +89,7 @@ class SlicedOperator(OperatorMixin):
     def _go_on(self, context: bpy.types.Context) -> Outcome:
         """Makes the window do the steps."""
         self._timer = context.window_manager.event_timer_add(NEXT, window=context.window)
-        context.workspace.status_text_set(_status(self.stop, *self._progress()))
+        context.workspace.status_text_set(_status(self.stop, *self._done()))
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -100,17 +100,17 @@ class SlicedOperator(OperatorMixin):
             return self.meanwhile
         try:
             if not self._advance(context, self._slice()):
-                context.workspace.status_text_set(_status(self.stop, *self._progress()))
+                context.workspace.status_text_set(_status(self.stop, *self._done()))
                 return self.meanwhile
-            self._cleanup(context)
+            self._leave(context)
             return self._finish(context)
         except ValueError as error:
-            self._cleanup(context)
+            self._leave(context)
             return report_error(self, error)
 
     def _slice(self) -> float:
         """How long to work: where redraws are slow, as without a graphics card, half of the time."""
-        return min(max(perf_counter() - self._last_slice_end, TIMER_SLICE), LONGEST_SLICE)
+        return min(max(perf_counter() - self._worked, TIMER_SLICE), LONGEST_SLICE)
 
     def _advance(self, context: bpy.types.Context, seconds: float) -> bool:
         """Works for some seconds, and returns whether all is done then."""
@@ -119,7 +119,7 @@ class SlicedOperator(OperatorMixin):
         for share in self._steps:
             self._share = share
             if perf_counter() > end:
-                self._last_slice_end = perf_counter()
+                self._worked = perf_counter()
                 return False
         # `_finish` has a slice of its own, because the last step and the new object may take long together.
         return self._timer is None or perf_counter() < end - 0.5 * seconds
@@ -128,11 +128,11 @@ class SlicedOperator(OperatorMixin):
         """Accepts whatever happens meanwhile, unless an operator overrides it."""
 
     def _stopped(self, context: bpy.types.Context) -> Outcome:
-        self._cleanup(context)
+        self._leave(context)
         self.report({"INFO"}, self.stopped)
         return {"CANCELLED"}
 
-    def _cleanup(self, context: bpy.types.Context) -> None:
+    def _leave(self, context: bpy.types.Context) -> None:
         """Removes everything that shows that it is going on."""
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
@@ -142,7 +142,7 @@ class SlicedOperator(OperatorMixin):
     def cancel(self, context: bpy.types.Context) -> None:
         """Blender calls it when it ends the operator itself: by a dialog, a new file or a closed window."""
         if self._timer is not None:
-            self._cleanup(context)
+            self._leave(context)
             print(f"{self.bl_label}: stopped because the file or the window was closed", file=sys.stderr)
 
 

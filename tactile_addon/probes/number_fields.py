@@ -43,7 +43,7 @@ def annotations(cls: type, found: Callable[[Object, str], float] = lambda owner,
     }
 
 
-def with_length_fields(cls: type[Any]) -> type[Any]:
+def dragged(cls: type[Any]) -> type[Any]:
     """Decorates an operator that shows its lengths through `fields`, and that Blender does not register.
 
     Blender's log of registered operators would list each of these properties.

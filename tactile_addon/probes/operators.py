@@ -19,11 +19,11 @@ from ..touch.settings import (
     length_property,
     touch_arguments,
 )
-from ..touch.touch_object import touch, with_verification
+from ..touch.touch_object import completed, touch
 from ..touch.types import Object, Outcome
 from ..touch.wording import fit_summary, sentence
 from .number_fields import fields
-from .probe import is_result, patch_for, probe_of, record_of, why_locked
+from .probe import is_result, lock_of, patch_near, probe_of, record_of
 
 NO_MESH = "There is no mesh to touch: add one (Shift A), or import a scan (File > Import)"
 
@@ -65,7 +65,7 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
                 )
         except ValueError as error:
             return report_error(self, error)
-        touched = with_verification(touched)
+        touched = completed(touched)
         patch = patch_object.insert(context.scene, touched)
         make_active(context, patch)
         report = touched.report
@@ -161,12 +161,12 @@ def has_target(operator: type[Any], context: bpy.types.Context) -> bool:
 
 def has_patch(operator: type[Any], context: bpy.types.Context, hint: str) -> bool:
     """Whether the active object is a patch, its probe or its contours; if not, the poll gives a hint."""
-    return polls(operator, patch_for(context.view_layer.objects.active), hint)
+    return polls(operator, patch_near(context.view_layer.objects.active), hint)
 
 
 def is_unlocked(operator: type[Any], context: bpy.types.Context) -> bool:
     """Whether the active object's probe or patch can be changed; the operator's poll says why not."""
-    lock = why_locked(context.view_layer.objects.active)
+    lock = lock_of(context.view_layer.objects.active)
     return polls(operator, lock is None, lock or "")
 
 

@@ -43,7 +43,7 @@ from bpy.props import (
 from ... import core
 from ..scene import patch_object, patch_record, shown
 from ..scene.family import children_of
-from ..touch.settings import OVERRIDABLE, FitSettings, TouchSettings, on_setting_changed, updates_suspended
+from ..touch.settings import OVERRIDABLE, FitSettings, TouchSettings, changed, is_silent
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object
 from . import anchor, number_fields
@@ -58,7 +58,7 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
         name="Is a Probe",
         description="Whether this Empty touches its target",
         options={"HIDDEN"},
-        update=lambda settings, context: _on_is_probe_changed(settings, context),
+        update=lambda settings, context: _appointed(settings, context),
         override=OVERRIDABLE,
     )
     target: PointerProperty(
@@ -74,7 +74,7 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
         description="Touch again whenever the probe, its target or a number changes. When off, the "
         "patch stays as it is until you press Touch Again beside this",
         default=True,
-        update=on_setting_changed,
+        update=changed,
         override=OVERRIDABLE,
     )
     show_handles: BoolProperty(
@@ -118,14 +118,14 @@ def forget_targets() -> None:
     _targets = None
 
 
-def _on_is_probe_changed(settings: TactileProbe, context: bpy.types.Context) -> None:
+def _appointed(settings: TactileProbe, context: bpy.types.Context) -> None:
     forget_targets()
-    on_setting_changed(settings, context)
+    changed(settings, context)
 
 
 def _chosen(settings: TactileProbe, context: bpy.types.Context) -> None:
     """Makes a probe that was a child of its target a child of the new target."""
-    if updates_suspended():  # It is the same target, which has come back or is an override now.
+    if is_silent():  # It is the same target, which has come back or is an override now.
         forget_targets()
         return
     settings.lost, probe, record = "", settings.id_data, record_of(settings.id_data)
@@ -136,7 +136,7 @@ def _chosen(settings: TactileProbe, context: bpy.types.Context) -> None:
     patch = patch_of(probe)
     if patch is not None and patch.is_editable and settings.target != before:
         patch.pop(anchor.BASE, None)  # The new target does not carry it.
-    _on_is_probe_changed(settings, context)
+    _appointed(settings, context)
 
 
 def is_probe(obj: Object) -> bool:
@@ -160,7 +160,7 @@ def _is_patch(obj: Object) -> bool:
     return patch_record.RECORD in obj and obj.type == "MESH"
 
 
-def patch_for(obj: Object) -> Object | None:
+def patch_near(obj: Object) -> Object | None:
     """The patch that `obj` is, or keeps as a probe, or is the contours of; or None."""
     if is_probe(obj):
         return patch_of(obj)
@@ -171,7 +171,7 @@ def patch_for(obj: Object) -> Object | None:
 
 def reconstruction_of(obj: Object) -> core.Reconstruction:
     """The core.Reconstruction of the patch near `obj`, where it is now. Raises ValueError without one."""
-    patch = patch_for(obj)
+    patch = patch_near(obj)
     if patch is None:
         raise ValueError("Wanted a patch, its probe or its contours, got another object or none")
     return patch_record.reconstruction_of(patch)
@@ -181,19 +181,19 @@ def probe_of(obj: Object) -> Object | None:
     """The probe that `obj` is, or is the patch or the contours of; or None."""
     if is_probe(obj):
         return obj
-    patch = patch_for(obj)
+    patch = patch_near(obj)
     return patch.parent if patch is not None and is_probe(patch.parent) else None
 
 
 def record_of(obj: Object) -> TouchReport | None:
     """The report, an ID property, of the patch near `obj`, or None."""
-    patch = patch_for(obj)
+    patch = patch_near(obj)
     return None if patch is None else patch_record.report_of(patch)
 
 
 def require_unlocked(obj: Object) -> None:
     """Raises ValueError if anything of the probe or patch near `obj` cannot be changed."""
-    patch = patch_for(obj)
+    patch = patch_near(obj)
     lines = None if patch is None else patch_record.contours_of(patch)
     for each in (probe_of(obj), patch, lines):
         if each is not None and not each.is_editable:
@@ -204,7 +204,7 @@ def require_unlocked(obj: Object) -> None:
             raise ValueError(f'"{each.name}" is being edited: leave its Edit Mode first')
 
 
-def why_locked(obj: Object) -> str | None:
+def lock_of(obj: Object) -> str | None:
     """A sentence on why the probe or patch near `obj` cannot be changed, or None if it can."""
     try:
         require_unlocked(obj)

@@ -78,14 +78,14 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
         found = probe.probe_of(context.view_layer.objects.active)
         depsgraph = context.evaluated_depsgraph_get()
         try:
-            touched = touch_again.touch_probe(found, depsgraph, complete=True, tolerance=self.tolerance)
+            touched = touch_again.touch_at(found, depsgraph, complete=True, tolerance=self.tolerance)
         except ValueError as error:
             return report_error(self, error)
         settings = found.tactile_probe
         settings.is_probe = False  # The changes below must not make it touch again each time.
         for plane in touched.report["added_planes"]:
             _add(settings, plane)
-        touch_again.apply_touch(found, touched, depsgraph, complete=True)
+        touch_again.adopt(found, touched, depsgraph, complete=True)
         settings.is_probe = True
         unit = units.unit_of(context.scene, touched.result.radius)
         self.report({"INFO"}, added_planes(touched.report, unit))
@@ -222,7 +222,7 @@ class TACTILE_OT_share_range(bpy.types.Operator):
         return has_patch(cls, context, "Select a patch, or its probe")
 
     def execute(self, context: bpy.types.Context) -> Outcome:
-        patch = probe.patch_for(context.view_layer.objects.active)
+        patch = probe.patch_near(context.view_layer.objects.active)
         count = color_range.share(patch, context.view_layer.objects)
         self.report({"INFO"}, f"{count} patches have one range of colors")
         return {"FINISHED"}

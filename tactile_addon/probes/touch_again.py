@@ -13,7 +13,7 @@ from mathutils import Matrix
 from ..scene import patch_object, patch_record
 from ..touch.evaluated_mesh import checksum_of, is_disabled, require_invertible
 from ..touch.settings import touch_arguments
-from ..touch.touch_object import TouchResult, touch, with_verification
+from ..touch.touch_object import Touched, completed, touch
 from ..touch.types import Object
 from ..touch.wording import sentence
 from . import anchor
@@ -23,7 +23,7 @@ NO_SHAPE = " 00000000"  # The end of settings.shape for a mesh that cannot be to
 VERTICES = 1000  # At most so many vertices around are compared with the patch; a quarter or more lie over it.
 
 
-def _put(probe: Object, touched: TouchResult) -> None:
+def _put(probe: Object, touched: Touched) -> None:
     """Puts the probe on the reference point, with z outward and x toward azimuth 0.
 
     It stays as it is if it is there already, or if constraints would take it back.
@@ -39,7 +39,7 @@ def _put(probe: Object, touched: TouchResult) -> None:
     is_there = np.allclose(old[:3, :3], new[:3, :3], atol=1e-4) and np.abs(old - new)[:3, 3].max() <= near
     if not is_there or anchor.is_carried(probe):
         scale = (probe.matrix_basis if anchor.is_attached(probe) else probe.matrix_world).to_scale()
-        anchor.set_probe_matrix(probe, wanted @ Matrix.Diagonal((*scale, 1.0)))
+        anchor.put(probe, wanted @ Matrix.Diagonal((*scale, 1.0)))
 
 
 def update(probe: Object, depsgraph: bpy.types.Depsgraph, complete: bool) -> None:
@@ -50,25 +50,25 @@ def update(probe: Object, depsgraph: bpy.types.Depsgraph, complete: bool) -> Non
     """
     settings, patch = probe.tactile_probe, patch_of(probe)
     try:
-        touched = touch_probe(probe, depsgraph, complete)
+        touched = touch_at(probe, depsgraph, complete)
     except ValueError as error:
         settings.message = sentence(error)
         if patch is not None:
-            anchor.follow_target(probe, patch)
-            patch_record.restore_transform(patch)
+            anchor.carry(probe, patch)
+            patch_record.hold(patch)
             patch_record.mark_outdated(
                 patch, f"This patch is from an earlier touch, because the last one failed. {settings.message}"
             )
-        _store_digest(probe, depsgraph)
+        _sign(probe, depsgraph)
     else:
-        apply_touch(probe, touched, depsgraph, complete)
+        adopt(probe, touched, depsgraph, complete)
 
 
-def apply_touch(probe: Object, touched: TouchResult, depsgraph: bpy.types.Depsgraph, complete: bool) -> None:
+def adopt(probe: Object, touched: Touched, depsgraph: bpy.types.Depsgraph, complete: bool) -> None:
     """Makes `touched` the probe's patch; `complete` as in update."""
     probe.tactile_probe.message = ""
     if complete:
-        touched = with_verification(touched, most=VERTICES)
+        touched = completed(touched, most=VERTICES)
         _put(probe, touched)
     probe.empty_display_size = 0.6 * touched.report["extent"]
     patch = patch_of(probe)
@@ -76,21 +76,21 @@ def apply_touch(probe: Object, touched: TouchResult, depsgraph: bpy.types.Depsgr
         patch = patch_object.insert(depsgraph.scene, touched, parent=probe, lines=_left_contours(probe))
     else:
         patch_object.rewrite(patch, touched)
-    anchor.store_transforms(probe, patch)
-    _store_digest(probe, depsgraph)
+    anchor.keep(probe, patch)
+    _sign(probe, depsgraph)
 
 
-def keep_patch(probe: Object, outdated: bool, complete: bool) -> None:
+def stand_by(probe: Object, outdated: bool, complete: bool) -> None:
     """Keeps the patch where it was, because there is no touch now, and lets it say whether it is outdated."""
     settings, patch = probe.tactile_probe, patch_of(probe)
     if complete:
-        anchor.bake_world_transform(probe, _extent_of(probe))
+        anchor.settle(probe, _extent_of(probe))
     if patch is None:
         if settings.digest and not settings.message:
             settings.message = "The probe has no patch: touch again for one, or delete the probe too"
         return
-    anchor.follow_target(probe, patch)
-    patch_record.restore_transform(patch)
+    anchor.carry(probe, patch)
+    patch_record.hold(patch)
     record = record_of(patch)
     if settings.message and record is not None and patch_record.VERDICT not in patch:
         settings.message = ""  # There was no patch, and undo has brought it back.
@@ -109,11 +109,11 @@ def _left_contours(probe: Object) -> Object | None:
     objects: Iterable[Object] = bpy.data.objects
     lines = (obj for obj in objects if patch_record.CONTOURS in obj and obj.parent is None)
     own = (obj for obj in lines if obj.is_editable and obj.data is not None)
-    touched, _ = _stored_digest(probe.tactile_probe)
+    touched, _ = _signed(probe.tactile_probe)
     return next((obj for obj in own if obj.data.get(DIGEST) == touched), None)
 
 
-def touch_probe(probe: Object, depsgraph: bpy.types.Depsgraph, complete: bool, **more: Any) -> TouchResult:
+def touch_at(probe: Object, depsgraph: bpy.types.Depsgraph, complete: bool, **more: Any) -> Touched:
     """A touch with the probe's inputs. Raises ValueError, with a sentence, if there can be none."""
     settings, matrix, record = probe.tactile_probe, probe.matrix_world, record_of(probe)
     if settings.target is None:
@@ -156,20 +156,20 @@ def may_be_outdated(probe: Object, there: Container[Object]) -> bool:
 
     there : the objects in the view layer
     """
-    settings, made, record = probe.tactile_probe, _output_datablocks(probe), record_of(probe)
+    settings, made, record = probe.tactile_probe, _made(probe), record_of(probe)
     return (
         bool(settings.message)
         or not made
         or (record is not None and settings.target is not None and record["source"] != settings.target.name)
         or settings.target not in there
         or is_disabled(settings.target)
-        or any(block.get(DIGEST) != _stored_digest(settings)[0] for block in made)
+        or any(block.get(DIGEST) != _signed(settings)[0] for block in made)
     )
 
 
 def is_outdated(probe: Object, depsgraph: bpy.types.Depsgraph) -> bool:
     """Whether the patch differs from what the inputs ask for, by the digests of probe and patch."""
-    (touched, name), made = _stored_digest(probe.tactile_probe), _output_datablocks(probe)
+    (touched, name), made = _signed(probe.tactile_probe), _made(probe)
     meshes = patch_object.meshes(patch_of(probe))
     if name != probe.name and (not meshes or any(mesh.users > 1 for mesh in meshes)):
         return True  # It is a copy, which has no patch of its own yet.
@@ -177,22 +177,22 @@ def is_outdated(probe: Object, depsgraph: bpy.types.Depsgraph) -> bool:
     return any(other != digest for other in (touched, *(block.get(DIGEST) for block in made)))
 
 
-def _output_datablocks(probe: Object) -> list[bpy.types.ID]:
+def _made(probe: Object) -> list[bpy.types.ID]:
     """The datablocks that a touch of the probe writes to."""
     patch = patch_of(probe)
     return [] if patch is None else [patch, *patch_object.meshes(patch)]
 
 
-def _store_digest(probe: Object, depsgraph: bpy.types.Depsgraph) -> None:
-    update_checksum(probe.tactile_probe, depsgraph)
+def _sign(probe: Object, depsgraph: bpy.types.Depsgraph) -> None:
+    measure_shape(probe.tactile_probe, depsgraph)
     probe.tactile_probe.seat = anchor.seat(probe, _extent_of(probe))
     digest = _digest(probe, depsgraph, list(probe.tactile_probe.seat))
     probe.tactile_probe.digest = f"{digest} {probe.name}"
-    for block in _output_datablocks(probe):
+    for block in _made(probe):
         block[DIGEST] = digest
 
 
-def _stored_digest(settings: Any) -> tuple[str, str]:
+def _signed(settings: Any) -> tuple[str, str]:
     """The digest of the last touch together with the name of the probe, which a copy does not share."""
     digest, _, name = settings.digest.partition(" ")
     return digest, name
@@ -218,7 +218,7 @@ def _extent_of(probe: Object) -> float:
     return 0.0 if patch is None else patch_record.extent_of(patch)
 
 
-def update_checksum(
+def measure_shape(
     settings: Any, depsgraph: bpy.types.Depsgraph, reshaped: dict[Any, int | None] | None = None
 ) -> None:
     """Keeps the checksum of the target, computed anew if the target is one of the `reshaped` objects.

@@ -13,7 +13,7 @@ from ..scene.attributes import HEIGHT_STD, MAP_COLOR, REASON
 from ..scene.mesh_data import values
 from ..stability_map import map_object
 from ..stability_map.map_report import map_summary, map_table_rows
-from ..stability_map.stability import NO_VALUE
+from ..stability_map.stability import NOTHING
 from ..touch import units
 from ..touch.arrays import read_array
 from ..touch.types import Object
@@ -35,7 +35,7 @@ def map_page(painted: Object) -> str:
             ),
         ),
         *_errors(painted.data, record, unit),
-        *parts.closing_sections(map_table_rows(record), record),
+        *parts.ending(map_table_rows(record), record),
     ]
     return page.page(f"{painted.name}: a stability map of {record['source']}", sections)
 
@@ -48,13 +48,13 @@ def _legend(painted: Object, record: Mapping[str, Any], unit: Unit) -> str:
         return swatches
     title = next(words for key, words, *_ in map_object.MAP_QUANTITIES if key == shown)
     low = "1" if shown in map_object.LOGARITHMIC else "0"
-    high = units.format_quantity(record["color_limit"], map_object.MAP_POWERS[shown], unit)
+    high = units.say(record["color_limit"], map_object.MAP_POWERS[shown], unit)
     return page.words(f"{title}: pale green at {low}, dark red from {high} on.") + swatches
 
 
 def _errors(mesh: bpy.types.Mesh, record: Mapping[str, Any], unit: Unit) -> list[str]:
     errors = values(mesh, "error")
-    known = errors != NO_VALUE
+    known = errors != NOTHING
     if not known.any():
         return []
     weights, std = np.ones(known.sum()), float(np.median(values(mesh, HEIGHT_STD)[known]))
@@ -67,6 +67,6 @@ def _errors(mesh: bpy.types.Mesh, record: Mapping[str, Any], unit: Unit) -> list
         page.section("Errors", parts.spread(errors[known], weights, unit, words)),
         page.section(
             "Tolerance bands",
-            parts.tolerance_table(errors[known], weights, std, unit, parts.shares_of(*size)),
+            parts.bands(errors[known], weights, std, unit, parts.shares_of(*size)),
         ),
     ]

@@ -32,7 +32,7 @@ def object_page(obj: Object) -> str:
         page.verdict(f"{object_summary(record)}. {record['message']}", record["status"] == "ok"),
         _pictures(obj.data, unit_of(record), "deviation" if was_touched else "height_std"),
         *(_deviations(obj.data, record) if was_touched else ()),
-        *parts.closing_sections(object_table_rows(record), record),
+        *parts.ending(object_table_rows(record), record),
     ]
     return page.page(f"{obj.name}: the surface of a whole object", sections)
 
@@ -52,7 +52,5 @@ def _deviations(mesh: bpy.types.Mesh, record: Mapping[str, Any]) -> list[str]:
     words = "Shares of the area by its distance from the mesh. The outermost bars count all larger distances."
     return [
         page.section("Deviations", parts.spread(off, areas, unit, words)),
-        page.section(
-            "Tolerance bands", parts.tolerance_table(off, areas, record["height_std"], unit, reaches)
-        ),
+        page.section("Tolerance bands", parts.bands(off, areas, record["height_std"], unit, reaches)),
     ]

@@ -39,14 +39,14 @@ def shares_of(length: float, what: str) -> list[tuple[str, float]]:
     return [(f"± {100.0 * share:g} % of the {what}", share * length) for share in SHARES]
 
 
-def tolerance_table(
+def bands(
     values: Array, weights: Array, std: float | None, unit: Unit, reaches: Sequence[tuple[str, float]]
 ) -> str:
     """The shares of the weights (n,) within named lengths, and within one to three standard deviations."""
 
     def row(name: str, reach: float, due: str = "") -> tuple[str, ...]:
         within = weights[np.abs(values) <= reach].sum() / weights.sum()
-        return name, units.format_quantity(reach, 1, unit), f"{100.0 * within:.1f} %", due
+        return name, units.say(reach, 1, unit), f"{100.0 * within:.1f} %", due
 
     rows = [row(*reach) for reach in reaches]
     for count, due in NORMAL_SHARES:
@@ -60,7 +60,7 @@ def tolerance_table(
     return page.table(rows, ("band", "", "within it", "expected, if normal"))
 
 
-def closing_sections(rows: Iterable[tuple[str, str]], record: Mapping[str, Any]) -> list[str]:
+def ending(rows: Iterable[tuple[str, str]], record: Mapping[str, Any]) -> list[str]:
     """The sections at the end of a page: what was found, as rows, and how."""
     return [
         page.section("What was found", page.table(rows)),
@@ -71,7 +71,7 @@ def closing_sections(rows: Iterable[tuple[str, str]], record: Mapping[str, Any])
 
 def label(power: int, unit: Unit) -> Callable[[float], str]:
     """A function that gives a value in length^power in words."""
-    return lambda value: units.format_quantity(value, power, unit) if value else "0"
+    return lambda value: units.say(value, power, unit) if value else "0"
 
 
 def _settings(record: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -40,13 +40,13 @@ def patch_page(patch: Object, r: core.Reconstruction) -> str:
     unit = units.unit_of(bpy.context.scene, r.radius)
     off = _deviations(patch, r, record)
     reaches = parts.shares_of(r.radius, "radius")
-    tolerance_table = parts.tolerance_table(off.lengths, off.weights, r.mean_height_std, unit, reaches)
+    bands = parts.bands(off.lengths, off.weights, r.mean_height_std, unit, reaches)
     sections = [
         page.verdict(f"{record['status']}: {record['message']}", record["status"] == "ok"),
         page.section("Pictures", *_pictures(patch, r, record, unit)),
         page.section("Deviations", parts.spread(off.lengths, off.weights, unit, off.words)),
-        page.section("Tolerance bands", tolerance_table),
-        *parts.closing_sections(readable_rows(record), record),
+        page.section("Tolerance bands", bands),
+        *parts.ending(readable_rows(record), record),
     ]
     return page.page(f"{patch.name}: a patch of {record['source']}", sections)
 

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ... import core
-from ..touch.touch_object import TouchResult
+from ..touch.touch_object import Touched
 from ..touch.types import Array
 from .attributes import CONTACT, CONTOUR
 from .mesh_data import fill
@@ -23,7 +23,7 @@ FACES = np.array([(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 
 SIDES = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)])  # The corners of a square tube.
 
 
-class _Topology(NamedTuple):
+class _Form(NamedTuple):
     """What all meshes with the same numbers of contacts have in common.
 
     before, after : for each point of all paths, the indices of the points between which its tube runs
@@ -36,7 +36,7 @@ class _Topology(NamedTuple):
     contact: Array
 
 
-def fill_contours(mesh: bpy.types.Mesh, touched: TouchResult) -> None:
+def fill_contours(mesh: bpy.types.Mesh, touched: Touched) -> None:
     """Tubes along the contours and an octahedron at each contact, in the Darboux frame.
 
     Point attributes tell them apart: `contour` is the number of the contour, and -1 for strokes and the rim;
@@ -51,7 +51,7 @@ def fill_contours(mesh: bpy.types.Mesh, touched: TouchResult) -> None:
         for path, contour in zip(contours, result.contours, strict=True)
     ]
     paths = [*contours, _rim(result)]  # The rim sets a flat patch off from a flat face below it.
-    form = _topology(tuple(len(path) for path in paths), len(strokes))
+    form = _form(tuple(len(path) for path in paths), len(strokes))
     lengths = [len(path) for path in paths]
     sizes = np.repeat(thickness * np.array([*(1.0 for _ in contours), RIM_THICKNESS]), lengths)
     tubes = _tubes(np.vstack(paths), np.repeat([*across, (0.0, 0.0, 1.0)], lengths, axis=0), sizes, form)
@@ -88,7 +88,7 @@ def _across(path: Array) -> Array:
     return np.array([-y, x, 0.0]) / max(np.hypot(x, y), 1e-30)
 
 
-def _tubes(paths: Array, across: Array, sizes: Array, form: _Topology) -> Array:
+def _tubes(paths: Array, across: Array, sizes: Array, form: _Form) -> Array:
     """The corners (4n, 3) of square tubes along paths (n, 3), in the planes normal to `across` (n, 3)."""
     ahead = paths[form.after] - paths[form.before]
     up = np.cross(across, ahead)
@@ -98,7 +98,7 @@ def _tubes(paths: Array, across: Array, sizes: Array, form: _Topology) -> Array:
 
 
 @lru_cache(maxsize=8)
-def _topology(lengths: tuple[int, ...], strokes: int) -> _Topology:
+def _form(lengths: tuple[int, ...], strokes: int) -> _Form:
     """The form of a mesh of paths with these lengths, the rim being the last, and of so many strokes."""
     paths = [slice(end - n, end) for n, end in zip(lengths, np.cumsum(lengths), strict=True)]
     at, felt = np.arange(sum(lengths)), lengths[:-1]
@@ -114,7 +114,7 @@ def _topology(lengths: tuple[int, ...], strokes: int) -> _Topology:
     of_tubes = np.concatenate([of_felt, np.full(lengths[-1], -1)])
     of_contacts = np.concatenate([of_felt, np.full(strokes, -1)])
     number = np.concatenate([np.arange(n) for n in (*felt, strokes)])
-    return _Topology(
+    return _Form(
         before,
         after,
         np.vstack([each.reshape(-1, 3) for each in (*quads, octahedra)]),

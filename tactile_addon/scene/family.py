@@ -10,7 +10,7 @@ import bpy
 from ..touch.types import Object
 
 _remembered: dict[Object, list[Object]] | None = (
-    None  # Within `cached_children`, the children by their parents; empty until somebody asks.
+    None  # Within `remembered`, the children by their parents; empty until somebody asks.
 )
 
 
@@ -32,7 +32,7 @@ def add(child: Object) -> None:
 
 
 @contextmanager
-def cached_children() -> Iterator[None]:
+def remembered() -> Iterator[None]:
     """Within this context, children are looked up once; no object may be deleted meanwhile."""
     global _remembered
     outer = _remembered

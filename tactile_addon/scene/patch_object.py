@@ -10,7 +10,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ... import core
-from ..touch.touch_object import TouchResult
+from ..touch.touch_object import Touched
 from ..touch.types import Array, Object
 from .attributes import COLOR, DEVIATION, HEIGHT_STD, NORMAL, PLACE, POSITION
 from .contour_mesh import fill_contours
@@ -27,7 +27,7 @@ from .patch_record import (
     matrix_of,
     place,
 )
-from .shown import recolor, update_neighbors
+from .shown import recolor, settle
 from .undo import note_added
 from .viewports import show_colors
 
@@ -40,7 +40,7 @@ STEEP = 1.7  # Where a patch is steep, it has to go up by so many times as much.
 
 
 def insert(
-    scene: bpy.types.Scene, touched: TouchResult, parent: Object | None = None, lines: Object | None = None
+    scene: bpy.types.Scene, touched: Touched, parent: Object | None = None, lines: Object | None = None
 ) -> Object:
     """Adds a patch and its contours to `scene`, in a collection of their own, and returns the patch object.
 
@@ -84,7 +84,7 @@ def remove_meshes(meshes: Iterable[bpy.types.Mesh]) -> None:
     bpy.data.batch_remove([material for material in materials if not material.users])
 
 
-def rewrite(patch: Object, touched: TouchResult) -> None:
+def rewrite(patch: Object, touched: Touched) -> None:
     """Changes the patch, and its contours if they are still there, to those of another touch, in place."""
     lines = contours_of(patch)
     for obj in filter(None, (patch, lines)):
@@ -108,10 +108,10 @@ def rewrite(patch: Object, touched: TouchResult) -> None:
         patch[RECONSTRUCTION] = json.dumps(core.to_dict(touched.result), allow_nan=False)
     recolor(patch)
     if touched.report["is_verified"]:
-        update_neighbors(patch)
+        settle(patch)
 
 
-def _above(patch: Object, touched: TouchResult) -> float:
+def _above(patch: Object, touched: Touched) -> float:
     """How far above the mesh a patch and its contours are drawn where they would lie in it."""
     radius, deepest = touched.result.radius, DEVIATIONS * touched.report["height_std"]
     if touched.report["is_verified"] and touched.surface is not None:
@@ -142,7 +142,7 @@ def collection(scene: bpy.types.Scene) -> bpy.types.Collection:
     return found
 
 
-def _fill_patch(obj: Object, touched: TouchResult) -> None:
+def _fill_patch(obj: Object, touched: Touched) -> None:
     """Fills the mesh with the patch in its Darboux frame; deviations are 0 until the patch is verified."""
     result, frame, mesh = touched.result, touched.result.frame, obj.data
     points, triangles = result.mesh()
@@ -162,7 +162,7 @@ def _fill_patch(obj: Object, touched: TouchResult) -> None:
     fill(mesh, points, triangles, attributes)
 
 
-def _follow(obj: Object, touched: TouchResult) -> None:
+def _follow(obj: Object, touched: Touched) -> None:
     """Moves the vertices to the patch of another touch, each at its place in the domain.
 
     Only the values that the colors show are brought up to date, because a gesture shows no others.

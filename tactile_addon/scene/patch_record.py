@@ -69,9 +69,9 @@ def extent_of(patch: Object) -> float:
     return extent if isinstance(extent, float) else 0.0
 
 
-def require_complete(patch: Object) -> None:
+def require_whole(patch: Object) -> None:
     """Raises ValueError if the patch object was edited such that it is no patch any more."""
-    if report_of(patch) is None or not (patch.type == "MESH" and _has_attributes(patch.data)):
+    if report_of(patch) is None or not (patch.type == "MESH" and _is_whole(patch.data)):
         raise edited(patch)
 
 
@@ -94,7 +94,7 @@ def reading(obj: Object) -> Iterator[None]:
 def is_colored(obj: Object) -> bool:
     """Whether an object is a patch or a whole object that nobody has edited, so that it can show colors."""
     is_one = ATLAS_RECORD in obj or (RECORD in obj and report_of(obj) is not None)
-    return is_one and obj.type == "MESH" and _has_attributes(obj.data)
+    return is_one and obj.type == "MESH" and _is_whole(obj.data)
 
 
 def require_colored(obj: Object) -> None:
@@ -108,7 +108,7 @@ def touched_record(obj: Object | None) -> Any:
     return None if obj is None else obj.get(MAP_RECORD) or obj.get(ATLAS_RECORD)
 
 
-def _has_attributes(mesh: bpy.types.Mesh) -> bool:
+def _is_whole(mesh: bpy.types.Mesh) -> bool:
     names = (*POWERS, COLOR)
     return len(mesh.vertices) > 0 and all(attribute_of(mesh, name) is not None for name in names)
 
@@ -136,7 +136,7 @@ def reconstruction_of(patch: Object) -> core.Reconstruction:
     If the object was not moved, it is what was fitted, to the last bit. Raises ValueError during a gesture,
     if the object's properties were edited, and if it no longer has its shape.
     """
-    require_complete(patch)
+    require_whole(patch)
     if RECONSTRUCTION not in patch:
         raise ValueError(f'"{patch.name}" is not complete: end the gesture, or touch again')
     try:
@@ -163,7 +163,7 @@ def place(obj: Object, matrix: Matrix) -> None:
     obj.matrix_basis = matrix
 
 
-def restore_transform(patch: Object) -> None:
+def hold(patch: Object) -> None:
     """Puts the patch back where it was touched, if its probe or somebody has moved it.
 
     A patch that constraints or an animation would move again stays where it is.
@@ -190,7 +190,7 @@ def touched_frame(patch: Object) -> tuple[Array, Array]:
     return np.transpose([frame[name] for name in ("d1", "d2", "normal")]), np.array(frame["origin"])
 
 
-def set_record_frame(patch: Object, axes: Array, origin: Array) -> None:
+def move_record(patch: Object, axes: Array, origin: Array) -> None:
     """Lets the record say that the patch was touched at this frame, unless it says so already."""
     report, (before, at) = patch[RECORD], touched_frame(patch)
     if np.array_equal(axes, before) and np.array_equal(origin, at):

@@ -61,7 +61,7 @@ def _unknown(mesh: bpy.types.Mesh) -> Any:
     return np.flatnonzero(np.isinf(values(mesh, CURVATURE_STD))) if CURVATURE_STD in mesh.attributes else []
 
 
-def update_neighbors(patch: Object) -> None:
+def settle(patch: Object) -> None:
     """Gives a patch one range of colors with others of its mesh, and draws it above those it overlaps."""
     others = _others(patch)
     share_range(patch, others)

@@ -16,7 +16,7 @@ from bpy.app.handlers import persistent
 
 from ..touch.types import Object
 
-_is_outside_step = False
+_is_late = False
 _added: set[int] = set()  # The session_uids of objects and collections that were added.
 _replaced: dict[
     int, int
@@ -27,25 +27,25 @@ _links: list[
 
 
 @contextmanager
-def outside_undo_step() -> Iterator[None]:
+def after_step() -> Iterator[None]:
     """Within this context, what is added may be in no undo step."""
-    global _is_outside_step
-    outer, _is_outside_step = _is_outside_step, True
+    global _is_late
+    outer, _is_late = _is_late, True
     try:
         yield
     finally:
-        _is_outside_step = outer
+        _is_late = outer
 
 
 def note_added(datablock: Object | bpy.types.Collection) -> None:
     """Notes a new object or collection that is linked to something that was there before."""
-    if _is_outside_step:
+    if _is_late:
         _added.add(datablock.session_uid)
 
 
 def note_copied(obj: Object, mesh: bpy.types.Mesh) -> None:
     """Notes an object that got a copy of `mesh` instead of it."""
-    if _is_outside_step:
+    if _is_late:
         _replaced[obj.data.session_uid] = mesh.session_uid
 
 

@@ -28,7 +28,7 @@ from ..scene.viewports import shows_colors
 from ..stability_map.map_operator import TACTILE_OT_stability_map
 from ..stability_map.map_report import map_rows, median_rows
 from ..touch import units
-from ..touch.settings import draw_auto, draw_sensor, draw_solver
+from ..touch.settings import draw_chosen, draw_sensor, draw_solver
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object, PanelMixin
 from ..touch.units import Unit
@@ -73,7 +73,7 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
             return
         row = layout.row(align=True)
         move = row.row(align=True)
-        move.enabled = probe.why_locked(found) is None
+        move.enabled = probe.lock_of(found) is None
         move.operator(TACTILE_OT_pick.bl_idname, text="Move", icon="EYEDROPPER")
         row.operator(TACTILE_OT_pick.bl_idname, text="New", icon="ADD").new = True
         row.operator(TACTILE_OT_delete.bl_idname, text="", icon="TRASH")
@@ -83,7 +83,7 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         fields = {}  # The override of a library's probe keeps numbers, but not the properties that show them.
         if found.override_library is None:
             fields = number_fields.fields(_size_of(settings.target, record)) | {"degree": "degree_shown"}
-        draw_auto(layout, settings, "extent", chosen, fields)
+        draw_chosen(layout, settings, "extent", chosen, fields)
         _draw_planes(layout, settings)
         row = layout.row()
         row.prop(settings, "live", text="Live" if settings.live else "Live (Frozen)")
@@ -133,10 +133,10 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         obj = context.view_layer.objects.active
-        return probe.probe_of(obj) is not None or probe.patch_for(obj) is not None
+        return probe.probe_of(obj) is not None or probe.patch_near(obj) is not None
 
     def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
-        found, patch = probe.probe_of(obj), probe.patch_for(obj)
+        found, patch = probe.probe_of(obj), probe.patch_near(obj)
         failed = "" if found is None else found.tactile_probe.message
         if failed:
             draw_sentence(context, layout, failed, "ERROR")

@@ -25,7 +25,7 @@ def main_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
         ("Principal Curvatures", ""),
         ("κ1", _measured(record, "k1", -1, unit)),
         ("κ2", _measured(record, "k2", -1, unit)),
-        ("Height", "± " + units.format_quantity(record["height_std"], 1, unit)),
+        ("Height", "± " + units.say(record["height_std"], 1, unit)),
         ("Misfit", mesh),
     ]
 
@@ -43,7 +43,7 @@ def other_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     if record["is_verified"] and record["vertices"]:
         rows.append(("Farthest", _said(record, "vertex_distance_max", 1, unit)))
     lengths = ("extent", "step") if "step" in record else ("radius",)
-    rows += [(key.title(), units.format_quantity(record[key], 1, unit)) for key in lengths]
+    rows += [(key.title(), units.say(record[key], 1, unit)) for key in lengths]
     return [*rows, ("Degree", str(record["degree"])), ("Contacts", str(record["contacts"]))]
 
 
@@ -54,7 +54,7 @@ def plane_rows(record: TouchReport, unit: Unit) -> list[tuple[str, str]]:
     plane = record["suggested_plane"]
     return [
         ("Suggested Plane", f"{plane['azimuth']:.0f}°"),
-        ("Expected Accuracy with It", f"± {units.format_quantity(plane['expected_height_std'], 1, unit)}"),
+        ("Expected Accuracy with It", f"± {units.say(plane['expected_height_std'], 1, unit)}"),
     ]
 
 
@@ -63,12 +63,12 @@ def found_values(record: Mapping[str, Any] | None, scene: bpy.types.Scene) -> di
     if record is None or record["status"] == "outdated" or "step" not in record:
         return {}
     unit = units.unit_of(scene, record["radius"])
-    lengths = {name: units.format_quantity(record[name], 1, unit) for name in ("extent", "step")}
+    lengths = {name: units.say(record[name], 1, unit) for name in ("extent", "step")}
     return lengths | {"degree": str(record["degree"])}
 
 
 def _said(record: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
-    return units.format_quantity(_value(record, key, power), power, unit)
+    return units.say(_value(record, key, power), power, unit)
 
 
 def _shape_index(record: Mapping[str, Any]) -> str:
@@ -78,7 +78,7 @@ def _shape_index(record: Mapping[str, Any]) -> str:
 
 
 def _measured(record: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
-    return units.format_quantity(_value(record, key, power), power, unit, record[f"{key}_std"])
+    return units.say(_value(record, key, power), power, unit, record[f"{key}_std"])
 
 
 def _value(record: Mapping[str, Any], key: str, power: int) -> float:
@@ -91,4 +91,4 @@ def _radii(record: Mapping[str, Any], unit: Unit) -> Iterator[tuple[str, str]]:
     for number in (1, 2):
         k, std = record[f"k{number}"], record[f"k{number}_std"]
         if abs(k) > FLAT_DEVIATIONS * std and abs(k) * record["radius"] > FLATTEST:
-            yield f"1/κ{number}", units.format_quantity(1.0 / k, 1, unit, std / k**2)
+            yield f"1/κ{number}", units.say(1.0 / k, 1, unit, std / k**2)

@@ -17,7 +17,7 @@ from ..scene.viewports import show_colors
 from ..touch.arrays import read_array
 from ..touch.settings import MOST_PLANES
 from ..touch.types import Array, Object
-from .stability import NO_VALUE, REASON_KEYS, REASONS, StabilityMap
+from .stability import NOTHING, REASON_KEYS, REASONS, StabilityMap
 
 SHADES = 256
 # The map is shown this share of the object's size above the mesh. With less it flickers if it is 20000 clip
@@ -98,14 +98,14 @@ def recolor(painted: Object) -> None:
     if shown == REASON:
         rgba, limit = colors.linear(REASON_COLORS)[values], len(REASON_KEYS) - 1.0
     else:
-        limit = _limit(shown, values[values != NO_VALUE], record["spacing"])
+        limit = _limit(shown, values[values != NOTHING], record["spacing"])
         table = colors.diverging(np.arange(SHADES), SHADES - 1)
         table = np.vstack([table, colors.linear([REFUSED])])
         share = np.maximum(values, 1.0 if shown in LOGARITHMIC else 0.0)
         share = np.log(share) / np.log(limit) if shown in LOGARITHMIC else share / limit
         share = np.minimum(share, 1.0)
         place = ((1.0 - share if shown in REVERSED else share) * (SHADES - 1) + 0.5).astype(np.int32)
-        rgba = table[np.where(values == NO_VALUE, SHADES, place)]
+        rgba = table[np.where(values == NOTHING, SHADES, place)]
     mesh.attributes[MAP_COLOR].data.foreach_set("color", rgba.astype(np.float32).ravel())
     mesh.update()
     record["color_limit"] = limit

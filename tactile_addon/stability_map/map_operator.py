@@ -5,8 +5,8 @@
 import bpy
 
 from ..probes import probe
-from ..probes.in_slices import Progress, SlicedOperator
-from ..probes.number_fields import with_length_fields
+from ..probes.in_slices import InSlices, Progress
+from ..probes.number_fields import dragged
 from ..probes.operators import (
     fields_of,
     has_target,
@@ -20,7 +20,7 @@ from ..touch.settings import (
     TARGET,
     TouchSettings,
     draw_all,
-    draw_auto,
+    draw_chosen,
     length_property,
     touch_arguments,
 )
@@ -31,8 +31,8 @@ from .map_report import map_summary
 from .stability import StabilityMap, expected_count
 
 
-@with_length_fields
-class TACTILE_OT_stability_map(SlicedOperator, TouchSettings, bpy.types.Operator):
+@dragged
+class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
     """Touch a mesh all over and paint a copy of it: where a patch can be trusted, and where there is none"""
 
     bl_idname = "tactile.stability_map"
@@ -57,7 +57,7 @@ class TACTILE_OT_stability_map(SlicedOperator, TouchSettings, bpy.types.Operator
         found = probe.probe_of(context.view_layer.objects.active)
         for name in NAMES if found is not None and not bpy.app.background else ():
             setattr(self, name, getattr(found.tactile_probe, name))
-        return self._confirm(context)
+        return self._ask(context)
 
     def _begin(self, context: bpy.types.Context) -> None:
         self._map = StabilityMap(
@@ -71,12 +71,12 @@ class TACTILE_OT_stability_map(SlicedOperator, TouchSettings, bpy.types.Operator
     def _stopped(self, context: bpy.types.Context) -> Outcome:
         """Keeps the touches so far when Esc is pressed."""
         if not self._map.done:
-            self._cleanup(context)
+            self._leave(context)
             return {"CANCELLED"}
-        self._steps = self._map.assign_nearest()
+        self._steps = self._map.spread()
         return {"RUNNING_MODAL"}
 
-    def _progress(self) -> Progress:
+    def _done(self) -> Progress:
         done, count = self._map.done, len(self._map.chosen)
         return f"Stability Map: {done} of {count} points", done / max(count, 1)
 
@@ -107,6 +107,6 @@ class TACTILE_OT_stability_map(SlicedOperator, TouchSettings, bpy.types.Operator
         layout.prop_search(self, "target", context.scene, "objects")
         layout.label(text=self._about(context), translate=False)
         fields = fields_of(context, self.target)
-        draw_auto(layout, self, "spacing", fields=fields)
+        draw_chosen(layout, self, "spacing", fields=fields)
         layout.separator()
         draw_all(layout, self, fields)

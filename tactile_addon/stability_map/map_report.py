@@ -18,7 +18,7 @@ def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     refused = ", ".join(f"{key} {count}" for key, count in record["refused"].items())
     unit = units.unit_of(bpy.context.scene, record["spacing"])
     names = ("spacing", "extent", "step")
-    lengths = [units.format_quantity(record[name], 1, unit) if record[name] else "auto" for name in names]
+    lengths = [units.say(record[name], 1, unit) if record[name] else "auto" for name in names]
     return [
         ("touched", f"{record['source']}, at {record['touched']} of {record['points']} points"),
         ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
@@ -42,7 +42,7 @@ def map_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     names, refused = {key: name for key, name, _ in REASONS}, [*record["refused"].items()]
     return [
         ("Points", str(record["touched"])),
-        ("Spacing", units.format_quantity(record["spacing"], 1, unit)),
+        ("Spacing", units.say(record["spacing"], 1, unit)),
         ("Patches", str(record["patches"])),
         ("… in Doubt", str(record["in_doubt"])),
         *([("No Patch", str(sum(count for _, count in refused)))] if refused else []),
@@ -60,4 +60,4 @@ def _medians(record: Mapping[str, Any], unit: Unit) -> Iterator[tuple[str, str, 
     """(attribute, title, value) of each median that is known."""
     for name, title, _, power in map_object.MAP_QUANTITIES:
         if f"{name}_median" in record:
-            yield name, title, units.format_quantity(record[f"{name}_median"], power, unit)
+            yield name, title, units.say(record[f"{name}_median"], power, unit)

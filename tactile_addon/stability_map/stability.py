@@ -25,7 +25,7 @@ SPACING_SHARE = 1.0 / 4.0  # The default spacing, as a share of the extent.
 BATCH = 20  # So many touches are fitted at once, in some hundredths of a second.
 GROWING_BATCH = 4  # Touches that choose their extent are fewer, because their fits have more contacts.
 NEAREST_AT_ONCE = 10_000  # So many vertices get their nearest touch at once.
-NO_VALUE = -1.0  # Each quantity has this value where there is no patch.
+NOTHING = -1.0  # Each quantity has this value where there is no patch.
 # The values of the attribute `reason`: key, name, and the stop of a curve that it follows from.
 REASONS = [
     ("patch", "Patch", None),
@@ -88,13 +88,13 @@ class StabilityMap:
         usual = extent or EXTENT_SHARE * self.surface.size
         # Touches of one extent have one step.
         self.extent, self.step = extent, step or extent / LEAST_STEPS
-        self._track_lengths: dict[str, Any] = {"extent": usual, "step": step or usual / LEAST_STEPS}
-        require_lengths(obj.name, self.surface.size, **self._track_lengths, noise=noise)
+        self._glance: dict[str, Any] = {"extent": usual, "step": step or usual / LEAST_STEPS}
+        require_lengths(obj.name, self.surface.size, **self._glance, noise=noise)
         self.spacing = spacing or SPACING_SHARE * usual
-        require_fine(self.surface.spacing, self._track_lengths["step"])
+        require_fine(self.surface.spacing, self._glance["step"])
         self.planes, self.noise, self.seed, self.fit = planes, noise, seed, fit
         self._rng = np.random.default_rng(seed)
-        _require_fits_plane(planes, fit, **self._track_lengths)
+        _rehearse(planes, fit, **self._glance)
         self.chosen: list[int] = []
         self.done = 0
 
@@ -107,7 +107,7 @@ class StabilityMap:
                 self.chosen.append(int(candidates[index]))
             yield
         count = len(self.chosen)
-        self.measures = np.full(count, NO_VALUE, dtype=[(name, float) for name in MEASURES])
+        self.measures = np.full(count, NOTHING, dtype=[(name, float) for name in MEASURES])
         self.reason = np.full(count, REASON_KEYS.index("nothing"), dtype=np.int32)
         batch = BATCH if self.extent else GROWING_BATCH
         size = batch if self.fit["method"] == "bayes" else 1
@@ -115,9 +115,9 @@ class StabilityMap:
             end = min(start + size, count)
             yield from self._touch(range(start, end))
             self.done = end
-        yield from self.assign_nearest()
+        yield from self.spread()
 
-    def assign_nearest(self) -> Iterator[None]:
+    def spread(self) -> Iterator[None]:
         """Finds the nearest of the touches that are done for each vertex, as a generator like `steps`."""
         from scipy.spatial import cKDTree
 
@@ -147,31 +147,31 @@ class StabilityMap:
         )
         for number, vertex, touch in zip(numbers, chosen, found, strict=True):
             if isinstance(touch, ValueError):
-                self.reason[number] = self._failure_reason(vertex)
+                self.reason[number] = self._why_none(vertex)
             elif ended := stops_at(touch.contours, surface.points[vertex]):
                 self.reason[number] = _reason_of(ended)
             else:
-                self._store(number, touch)
+                self._note(number, touch)
             yield
 
-    def _failure_reason(self, vertex: int) -> int:
+    def _why_none(self, vertex: int) -> int:
         """The code of the reason why there is no touch at a vertex."""
         surface, point = self.surface, self.surface.points[vertex]
         try:
-            contours = core.track(surface, point, surface.normals[vertex], self.planes, **self._track_lengths)
+            contours = core.track(surface, point, surface.normals[vertex], self.planes, **self._glance)
         except ValueError:  # The settings are valid, so a face there has no area.
             return REASON_KEYS.index("nothing")
         shortest = min(contours, key=lambda contour: len(contour.points))
         return _reason_of(stops_at(contours, point) or shortest.stops)
 
-    def _store(self, number: int, touch: core.Exploration) -> None:
+    def _note(self, number: int, touch: core.Exploration) -> None:
         result, surface = touch.result, self.surface
         off = core.height_error(result, surface)
         status, _ = core.judged_by_mesh(result, off or 0.0)
         is_sure = status == "ok" and not core.has_few_facets(result, surface.face_near, surface.corners_of)
         self.reason[number] = REASON_KEYS.index("patch" if is_sure else "doubt")
         self.measures[number] = (
-            NO_VALUE if off is None else off,
+            NOTHING if off is None else off,
             result.mean_height_std,
             touch.extent,
             result.condition_number,
@@ -191,7 +191,7 @@ class StabilityMap:
         }
         for name in MEASURES:
             values = self.measures[name][: self.done]
-            known = values[values != NO_VALUE].tolist()
+            known = values[values != NOTHING].tolist()
             if known:
                 report[f"{name}_median"] = median(known)
         names = ("spacing", "extent", "step", "noise", "seed")
@@ -219,7 +219,7 @@ class _Plane:
         return tuple(a + gone * b for a, b in zip(origin, direction, strict=True)), (0.0, 0.0, 1.0)
 
 
-def _require_fits_plane(
+def _rehearse(
     planes: Sequence[core.SamplingPlane], fit: Mapping[str, Any], extent: float, step: float
 ) -> None:
     """Raises ValueError for settings that cannot even rebuild a plane: all touches would be refused."""

@@ -11,13 +11,13 @@ import numpy as np
 from mathutils.bvhtree import BVHTree
 
 from .arrays import read_array
-from .evaluated_mesh import TransformedMesh, coordinates, disabled, evaluated_object
+from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object
 from .types import Array, Object, Point, Triple
 
-RECHECK_FACTOR = 50.0  # The shape is compared again after so many times as long as that takes.
+PAUSE = 50.0  # The shape is compared again after so many times as long as that takes.
 
 
-class DetachedMesh(TransformedMesh):
+class DetachedMesh(PlacedMesh):
     """The evaluated mesh of an object as it was; nothing in it points to Blender's scene.
 
     It is in the directions of the world, relative to the object's origin, so that its place does not round
@@ -84,7 +84,7 @@ class DetachedMesh(TransformedMesh):
             evaluated, _, _ = evaluated_object(found, context.evaluated_depsgraph_get())
             if zlib.crc32(coordinates(found.name, evaluated).data) != self._checksum:
                 raise ValueError(f'"{self.name}" was changed while it was touched: start again')
-            self._compared_until = perf_counter() + RECHECK_FACTOR * (perf_counter() - begin)
+            self._compared_until = perf_counter() + PAUSE * (perf_counter() - begin)
         return found
 
     def require_same(self, context: bpy.types.Context) -> Object:
@@ -92,7 +92,7 @@ class DetachedMesh(TransformedMesh):
         self._compared_until = 0.0
         return self.require_source(context)
 
-    def has_boundary_edges(self) -> bool:
+    def has_rims(self) -> bool:
         """Whether edges have one face only, as around holes. Vertices in one place count as one."""
         _, same = np.unique(self.points, axis=0, return_inverse=True)
         ends = np.sort(same.ravel()[self.triangles[:, [[0, 1], [1, 2], [2, 0]]]].reshape(-1, 2), axis=1)
@@ -107,7 +107,7 @@ class DetachedMesh(TransformedMesh):
 
     def project(self, location: Point) -> tuple[Triple, Triple, float]:
         """The point of the mesh nearest to a place, the unit normal there, and the distance."""
-        return self._closest_point(location, location)
+        return self._foot(location, location)
 
     def _nearest(self, local: Any) -> Any:
         return self._tree.find_nearest(local)[:2]

@@ -106,7 +106,7 @@ def require_invertible(name: str, matrix: Array) -> None:
         raise ValueError(f'"{name}" has a scale of 0 in some direction: give it another scale')
 
 
-class TransformedMesh:
+class PlacedMesh:
     """A mesh that is touched in other axes than its own: it transforms rays, and what they find.
 
     The transform is computed in Python floats. mathutils rounds to float32, which far from the world's
@@ -123,7 +123,7 @@ class TransformedMesh:
     def __init__(self, linear: Array, origin: Array, cast: Callable[[Point, Point, float], Any]) -> None:
         self._linear, self._origin, self._cast = linear, origin, cast
         self._inverse = np.linalg.inv(linear)
-        self._linear_rows, self._inverse_rows, self._normal_rows, self._translation = (
+        self._rows, self._inverse_rows, self._normal_rows, self._at = (
             array.tolist() for array in (linear, self._inverse, self._inverse.T, origin)
         )
         # Most scans are neither moved nor turned nor scaled.
@@ -134,7 +134,7 @@ class TransformedMesh:
         if self._is_in_place:
             point, normal = self._cast(origin, direction, distance)
             return None if point is None or not any(normal) else (point, normal)
-        back, (x, y, z) = self._inverse_rows, self._translation
+        back, (x, y, z) = self._inverse_rows, self._at
         local = product(back, *direction)
         start = product(back, origin[0] - x, origin[1] - y, origin[2] - z)
         point, normal = self._cast(start, local, distance * math.hypot(*local))
@@ -172,7 +172,7 @@ class TransformedMesh:
         foot = self._to_world(self._nearest(self._to_local(point))[0])
         return math.copysign(math.dist(point, foot), np.dot(normal, np.subtract(point, foot)))
 
-    def _closest_point(self, near: Point, location: Point) -> tuple[Triple, Triple, float]:
+    def _foot(self, near: Point, location: Point) -> tuple[Triple, Triple, float]:
         """The point nearest to the world point `near` as the mesh measures, its normal, its distance."""
         point, normal = self._nearest(self._to_local(near))
         if point is None:
@@ -183,8 +183,8 @@ class TransformedMesh:
         return point, self._normal_to_world(normal), math.dist(location, point)
 
     def _to_world(self, point: Point) -> Triple:
-        x, y, z = product(self._linear_rows, *point)
-        return x + self._translation[0], y + self._translation[1], z + self._translation[2]
+        x, y, z = product(self._rows, *point)
+        return x + self._at[0], y + self._at[1], z + self._at[2]
 
     def _to_local(self, point: Point) -> Any:
         return self._inverse @ np.subtract(point, self._origin)

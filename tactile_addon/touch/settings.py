@@ -46,52 +46,49 @@ AUTO = {  # These are literals, so that they can be translated.
     "edge": "Edge Length (Auto)",
 }
 MOST_PLANES = 6
-MAX_TILT = math.radians(60)  # The mouse tilts planes by no more.
+STEEPEST = math.radians(60)  # The mouse tilts planes by no more.
 OVERRIDABLE: set[Any] = {"LIBRARY_OVERRIDABLE"}  # The override of a library's probe keeps these as its own.
-_updates_suspended = False  # Whether settings change within `without_updates`.
+_is_silent = False  # Whether settings change within `silent`.
 
 
 @contextmanager
-def without_updates() -> Iterator[None]:
+def silent() -> Iterator[None]:
     """Within this context, no handler looks at settings that change: the caller does it."""
-    global _updates_suspended
-    _updates_suspended = True
+    global _is_silent
+    _is_silent = True
     try:
         yield
     finally:
-        _updates_suspended = False
+        _is_silent = False
 
 
-def updates_suspended() -> bool:
-    """Whether settings change within `without_updates`."""
-    return _updates_suspended
+def is_silent() -> bool:
+    """Whether settings change within `silent`."""
+    return _is_silent
 
 
-_last_settings = None  # These settings of a probe were looked at last, and nothing has happened since.
+_answered = None  # These settings of a probe were looked at last, and nothing has happened since.
 
 
-def on_setting_changed(settings: Any, context: bpy.types.Context) -> None:
+def changed(settings: Any, context: bpy.types.Context) -> None:
     """Makes the handler look at a probe at once, so that the patch is part of the same undo step."""
-    global _last_settings
-    if _updates_suspended or not isinstance(settings.id_data, Object) or not settings.is_probe:
+    global _answered
+    if _is_silent or not isinstance(settings.id_data, Object) or not settings.is_probe:
         return
     now = repr((settings.id_data, settings.target, settings.live, touch_arguments(settings)))
-    if now != _last_settings:  # Blender calls this twice for a number of an array.
+    if now != _answered:  # Blender calls this twice for a number of an array.
         settings.id_data.update_tag()
         context.view_layer.update()
-        _last_settings = now
+        _answered = now
 
 
-def forget_last_settings() -> None:
+def something_happened() -> None:
     """Makes the next setting be looked at even if it is as it was."""
-    global _last_settings
-    _last_settings = None
+    global _answered
+    _answered = None
 
 
-KEPT = {
-    "update": on_setting_changed,
-    "override": OVERRIDABLE,
-}  # A probe's properties need these, an operator's do not.
+KEPT = {"update": changed, "override": OVERRIDABLE}  # A probe's properties need these, an operator's do not.
 UNSAVED: set[Any] = {"SKIP_SAVE", "SKIP_PRESET"}
 TARGET = StringProperty(
     name="Target",
@@ -171,8 +168,8 @@ class TouchSettings(FitSettings):
         description="Angles by which the sampling planes lean away from the normal",
         size=MOST_PLANES,
         unit="ROTATION",
-        soft_min=-MAX_TILT,
-        soft_max=MAX_TILT,
+        soft_min=-STEEPEST,
+        soft_max=STEEPEST,
         **KEPT,
     )
     extent: length_property(
@@ -205,7 +202,7 @@ def touch_arguments(settings: Any) -> dict[str, Any]:
     }
 
 
-def draw_auto(
+def draw_chosen(
     layout: bpy.types.UILayout,
     settings: Any,
     name: str,
@@ -235,8 +232,8 @@ def draw_sensor(
     found: Mapping[str, str] | None = None,
     fields: Mapping[str, str] | None = None,
 ) -> None:
-    """Draws the rows of step and noise; `found` and `fields` as in draw_auto."""
-    draw_auto(layout, settings, "step", found, fields)
+    """Draws the rows of step and noise; `found` and `fields` as in draw_chosen."""
+    draw_chosen(layout, settings, "step", found, fields)
     layout.prop(settings, (fields or {}).get("noise", "noise"))
     if settings.noise:
         layout.prop(settings, "seed")
@@ -248,16 +245,16 @@ def draw_solver(
     found: Mapping[str, str] | None = None,
     fields: Mapping[str, str] | None = None,
 ) -> None:
-    """Draws the rows of the method and of its options; `found` and `fields` as in draw_auto."""
+    """Draws the rows of the method and of its options; `found` and `fields` as in draw_chosen."""
     layout.prop(settings, "method")
-    draw_auto(layout, settings, "degree", found, fields)
+    draw_chosen(layout, settings, "degree", found, fields)
     if settings.method in ("tagc", "quadratic-variation"):
         layout.prop(settings, "weight")
 
 
 def draw_all(layout: bpy.types.UILayout, settings: Any, fields: Mapping[str, str] | None = None) -> None:
-    """Draws all settings, as Adjust Last Operation has them; `fields` as in draw_auto."""
-    draw_auto(layout, settings, "extent", fields=fields)
+    """Draws all settings, as Adjust Last Operation has them; `fields` as in draw_chosen."""
+    draw_chosen(layout, settings, "extent", fields=fields)
     layout.prop(settings, "plane_count")
     for i in range(settings.plane_count):
         column = layout.column(align=True)

@@ -10,33 +10,27 @@ import bpy
 import numpy as np
 
 from .arrays import read_array
-from .evaluated_mesh import TransformedMesh, coordinates, disabled, evaluated_object, size_of
+from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, size_of
 from .types import Array, Object, Point, Triple
 
-OVERSAMPLING = 8  # So many times as many vertices as are wanted are looked at first, before all are.
-MAX_ITERATIONS = (
-    8  # The way to the nearest point of a stretched object has at most so many steps; mostly two or three.
-)
-VERTEX_TOLERANCE = (
-    1e-4  # A point that is nearer to a vertex than this share of its face's size is that vertex.
-)
-MIN_NORMAL_COSINE = (
-    0.77  # The cosine between the normals of a vertex and of a face beside it is more, but on a crease.
-)
+MANY = 8  # So many times as many vertices as are wanted are looked at first, before all are.
+WALK = 8  # The way to the nearest point of a stretched object has at most so many steps; mostly two or three.
+AT_VERTEX = 1e-4  # A point that is nearer to a vertex than this share of its face's size is that vertex.
+SMOOTH = 0.77  # The cosine between the normals of a vertex and of a face beside it is more, but on a crease.
 
 
-class MeshSurface(TransformedMesh):
+class MeshSurface(PlacedMesh):
     """The evaluated mesh of an object, which core.track touches through `ray_cast`.
 
     sound : whether all its vertices are known to be at finite places, which takes time to check
     size : the longest edge of its bounding box, in the world
     """
 
-    def __init__(self, obj: Object, depsgraph: bpy.types.Depsgraph, vertices_checked: bool = False) -> None:
+    def __init__(self, obj: Object, depsgraph: bpy.types.Depsgraph, sound: bool = False) -> None:
         """Raises ValueError, with a sentence, if `obj` cannot be touched."""
         try:
             evaluated, linear, origin = evaluated_object(obj, depsgraph)
-            if not vertices_checked:
+            if not sound:
                 self._co = coordinates(obj.name, evaluated)
             evaluated.ray_cast((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), distance=1e-30, depsgraph=depsgraph)
         except RuntimeError as error:
@@ -62,10 +56,7 @@ class MeshSurface(TransformedMesh):
         """
         # A sphere in the world is an ellipsoid in the object, which its longest axis bounds.
         reach = radius * np.linalg.norm(self._inverse, ord=2)
-        at, few = (
-            self._to_local(point).astype(np.float32),
-            len(self._co) // (OVERSAMPLING * (most or len(self._co))),
-        )
+        at, few = self._to_local(point).astype(np.float32), len(self._co) // (MANY * (most or len(self._co)))
         for stride in dict.fromkeys((max(few, 1), 1)):  # All are asked only if some are not enough.
             local = self._co[::stride] - at
             near = stride * np.flatnonzero(np.einsum("ij,ij->i", local, local) <= reach**2)
@@ -82,14 +73,14 @@ class MeshSurface(TransformedMesh):
         At a vertex no face is nearer than the others, so the normal there is the vertex's, unless that is on
         a crease.
         """
-        found = self._descend(location, location)
+        found = self._walk(location, location)
         gram = self._linear.T @ self._linear
         stretched = not np.allclose(gram, gram[0, 0] * np.eye(3), rtol=0.0, atol=1e-4 * gram[0, 0])
         if stretched and found[2] > 1e-3 * self.size:
             # In a stretched object, the nearest point may be on another sheet than in the world.
             offsets = self._co @ self._linear.T - np.subtract(location, self._origin)
             nearest = self._co[np.argmin(np.einsum("ij,ij->i", offsets, offsets))]
-            found = min(found, self._descend(self._to_world(nearest.tolist()), location), key=lambda f: f[2])
+            found = min(found, self._walk(self._to_world(nearest.tolist()), location), key=lambda f: f[2])
         point, normal, distance = found
         return point, self._vertex_normal(point, normal), distance
 
@@ -98,23 +89,23 @@ class MeshSurface(TransformedMesh):
         number = self.face_near(point)
         gaps = np.linalg.norm(self.corners_of(number) - point, axis=1)
         corner = int(np.argmin(gaps))
-        if gaps[corner] > VERTEX_TOLERANCE * gaps.max():
+        if gaps[corner] > AT_VERTEX * gaps.max():
             return normal
         vertex = self._mesh.polygons[number].vertices[corner]
         mean = np.array(self._mesh.vertex_normals[vertex].vector) @ self._inverse
         mean /= max(float(np.linalg.norm(mean)), 1e-30)
-        return mean.tolist() if np.dot(mean, normal) > MIN_NORMAL_COSINE else normal
+        return mean.tolist() if np.dot(mean, normal) > SMOOTH else normal
 
-    def _descend(self, start: Point, location: Point) -> tuple[Triple, Triple, float]:
+    def _walk(self, start: Point, location: Point) -> tuple[Triple, Triple, float]:
         """The nearest point, downhill from the one that is nearest to `start` as the object measures.
 
         Each step goes to the foot of the perpendicular on the face found, as long as that is nearer.
         """
-        found = self._closest_point(start, location)
-        for _ in range(MAX_ITERATIONS):
+        found = self._foot(start, location)
+        for _ in range(WALK):
             point, normal, distance = found
             height = np.dot(np.subtract(location, point), normal)
-            ahead = self._closest_point(np.subtract(location, height * np.array(normal)), location)
+            ahead = self._foot(np.subtract(location, height * np.array(normal)), location)
             if ahead[2] >= (1.0 - 1e-6) * distance:
                 break
             found = ahead
@@ -128,7 +119,7 @@ class MeshSurface(TransformedMesh):
         )
         return float(max(world, scale * local))
 
-    def longest_edge_at(self, point: Point) -> float:
+    def facet(self, point: Point) -> float:
         """The longest edge of the face nearest to a world point."""
         corners = self.corners_of(self.face_near(point))
         return float(np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max())

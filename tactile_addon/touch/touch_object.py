@@ -14,22 +14,22 @@ import numpy as np
 from ... import core
 from ...core.arguments import unit_vector
 from .detached_mesh import DetachedMesh
-from .settings import MAX_TILT, MOST_PLANES
+from .settings import MOST_PLANES, STEEPEST
 from .single_precision import require_single
 from .surface import MeshSurface
 from .touch_report import (
     TouchReport,
     ends,
+    judgment,
     measures,
     reconstruction_report,
-    status_report,
     suggestion_report,
 )
 from .types import Array, Object, Point, Triple
 from .units import length
 
 FARTHEST_SHARE = 1.0 / 2.0  # A half contour is at most this share of the object's size long.
-MAX_OFFSET_SHARE = 1.0 / 8.0  # Without an extent, the location may be this share of the size off the surface.
+AWAY = 1.0 / 8.0  # Without an extent, the location may be this share of the size off the surface.
 FINEST_STEP = 1.0 / 128.0  # The step is this share of the size if neither step nor extent is given.
 LEAST_STEPS = 12  # Without a step, a half contour has at least so many.
 LARGE_FACET = 4.0  # The finger feels facets that are longer than so many steps, and creases between them.
@@ -37,7 +37,7 @@ STEP_ROUNDING = 1.0 / 20.0  # Contacts that are rounded by more of a step say no
 
 
 @dataclass(frozen=True, eq=False)
-class TouchResult:
+class Touched:
     """The outcome of a touch: no surface if contours were measured elsewhere, a report of plain values."""
 
     surface: MeshSurface | None
@@ -59,9 +59,9 @@ def touch(
     step: float,
     noise: float,
     seed: int,
-    vertices_checked: bool = False,
+    sound: bool = False,
     **fit: Any,
-) -> TouchResult:
+) -> Touched:
     """Tracks the evaluated `obj` from `location` and reconstructs the patch there.
 
     location : world coordinates, which are projected onto the object
@@ -76,18 +76,16 @@ def touch(
     Raises ValueError with a sentence for the user.
     """
     clock = [perf_counter()]
-    surface = MeshSurface(obj, depsgraph, vertices_checked)
+    surface = MeshSurface(obj, depsgraph, sound)
     require_lengths(obj.name, surface.size, extent, step, noise)
-    point, surface_normal = nearest_point(
-        obj.name, surface, location, extent or MAX_OFFSET_SHARE * surface.size
-    )
+    point, surface_normal = nearest_point(obj.name, surface, location, extent or AWAY * surface.size)
     require_fine(surface.spacing(point), step or extent / LEAST_STEPS or FINEST_STEP * surface.size)
     outward = unit_vector("outward", surface_normal if outward is None else outward)
     if toward is not None and np.dot(outward, toward) < 0.0:
         outward = [-v for v in outward]
     axes = reference_axes(outward, tangent)
     clock.append(perf_counter())
-    found = _explore(
+    found = _explored(
         surface,
         point,
         outward,
@@ -118,16 +116,16 @@ def touch(
         "axes": axes.tolist(),
         "seconds": dict(zip(("prepare", "touch"), np.diff(clock).tolist(), strict=True)),
     }
-    return TouchResult(surface, found.result, report)
+    return Touched(surface, found.result, report)
 
 
-def _explore(surface: MeshSurface, point: Point, *where: Any, **given: Any) -> core.Exploration:
+def _explored(surface: MeshSurface, point: Point, *where: Any, **given: Any) -> core.Exploration:
     """What core.explore finds. Where facets are longer than some steps, an error says so."""
     try:
         return core.explore(surface, point, *where, **given)
     except core.DegenerateCurvesError as error:
         step = {"auto": FINEST_STEP * surface.size}.get(given["step"], given["step"])
-        facet = surface.longest_edge_at(point)
+        facet = surface.facet(point)
         if given["noise"] or facet < LARGE_FACET * step:
             raise
         raise ValueError(
@@ -137,7 +135,7 @@ def _explore(surface: MeshSurface, point: Point, *where: Any, **given: Any) -> c
 
 
 def _exploration_report(found: core.Exploration, given: int, ended: str, few_facets: bool) -> TouchReport:
-    """The report of a touch whose first `given` planes were given; the rest as in `status_report`."""
+    """The report of a touch whose first `given` planes were given; the rest as in `judgment`."""
     added = zip(found.planes[given:], found.stds, found.stds[1:], strict=False)
     return {
         "degree": found.result.patch.degree,
@@ -153,7 +151,7 @@ def _exploration_report(found: core.Exploration, given: int, ended: str, few_fac
     }
 
 
-def with_verification(touched: TouchResult, most: int | None = None) -> TouchResult:
+def completed(touched: Touched, most: int | None = None) -> Touched:
     """The touch with the slow parts of its report, too: where to touch next, and distances to the mesh.
 
     most : the largest number of vertices to compare; None for all
@@ -162,7 +160,7 @@ def with_verification(touched: TouchResult, most: int | None = None) -> TouchRes
     found = _verification_report(touched.surface, result, most)
     # Where vertices are many they would count more, and if faces are large, there may be none in a pocket.
     off = core.height_error(result, touched.surface)
-    found |= status_report(result, off or 0.0, report["ended"], report["few_facets"])
+    found |= judgment(result, off or 0.0, report["ended"], report["few_facets"])
     clock.append(perf_counter())
     plane = suggestion_report(result, np.array(report["axes"]))
     clock.append(perf_counter())
@@ -236,7 +234,7 @@ def plane_axes(matrix: Any, settings: Any, number: int) -> Array:
 
     See core.SamplingPlane.axes. A tilt that is too steep to touch with is drawn as the steepest.
     """
-    tilt = min(max(settings.tilts[number], -MAX_TILT), MAX_TILT)
+    tilt = min(max(settings.tilts[number], -STEEPEST), STEEPEST)
     plane = core.SamplingPlane(settings.azimuths[number], tilt)
     return plane.axes(matrix.col[2].xyz, matrix.col[0].xyz)
 

@@ -142,9 +142,7 @@ def stops_at(contours: Sequence[core.Contour], point: Array, reach: float = 0.0)
     ]
 
 
-def status_report(
-    result: core.Reconstruction, mean: float, ended: str, few_facets: bool = False
-) -> TouchReport:
+def judgment(result: core.Reconstruction, mean: float, ended: str, few_facets: bool = False) -> TouchReport:
     """Status and message, see core.judged_by_mesh; `ended` is added to the fit's own message.
 
     few_facets : see core.has_few_facets
@@ -193,10 +191,10 @@ def measures(result: core.Reconstruction) -> TouchReport:
 def reconstruction_report(
     result: core.Reconstruction, ended: str = "", few_facets: bool = False
 ) -> TouchReport:
-    """The report of a fit before it is compared with a mesh; arguments as in `status_report`."""
+    """The report of a fit before it is compared with a mesh; arguments as in `judgment`."""
     (d1, d2, n), at_point = result.frame.axes.T.tolist(), result.patch.derivatives(0.0, 0.0)
     return {
-        **status_report(result, 0.0, ended, few_facets),
+        **judgment(result, 0.0, ended, few_facets),
         "few_facets": few_facets,
         "ended": ended,
         "is_verified": False,

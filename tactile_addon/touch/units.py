@@ -38,7 +38,7 @@ def unit_of(scene: bpy.types.Scene, size: float) -> Unit:
     return symbol, meters / settings.scale_length
 
 
-def format_quantity(value: float, power: int, unit: Unit, std: float | None = None) -> str:
+def say(value: float, power: int, unit: Unit, std: float | None = None) -> str:
     """A value in length^power in words, such as "0.0123 mm" or "-4.2 ± 0.3 1/mm²"."""
     spread = "" if std is None else f" ± {float(f'{std / unit[1] ** power:.1g}'):g}"
     return f"{known(value, std) / unit[1] ** power:.3g}{spread} {symbol(power, unit)}".strip()
@@ -52,7 +52,7 @@ def known(value: float, std: float | None) -> float:
 def length(value: float, unit: Unit | None = None) -> str:
     """A length in words for a message, in this unit or in that of the open scene."""
     size = abs(value) if 0.0 < abs(value) < math.inf else 1.0
-    return format_quantity(value, 1, unit or unit_of(bpy.context.scene, size))
+    return say(value, 1, unit or unit_of(bpy.context.scene, size))
 
 
 def symbol(power: int, unit: Unit) -> str:

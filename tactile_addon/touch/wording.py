@@ -11,9 +11,9 @@ import numpy as np
 
 from ... import core
 from .touch_report import Registration, SuggestedPlane, TouchReport
-from .units import Unit, format_quantity, known, length, unit_of
+from .units import Unit, known, length, say, unit_of
 
-STATISTICS = ("mean", "median", "max", "rms")
+SPREAD = ("mean", "median", "max", "rms")
 FORMULAS = ("=", "+", "-", "@", "\t", "\r", "\n")  # Spreadsheets run text that begins with one of these.
 ROUNDING = 1e-6  # A component below this share of the largest is what single precision leaves of 0.
 EARLY = ("edge", "crease", "turns away")  # These end a curve early.
@@ -37,7 +37,7 @@ def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
         ("Gaussian curvature", _measured(report, "gaussian_curvature", -2, unit)),
         ("mean curvature", _measured(report, "mean_curvature", -1, unit)),
         ("shape index", f"{report['shape_index']:.3f}"),
-        ("curvedness", format_quantity(report["curvedness"], -1, unit)),
+        ("curvedness", say(report["curvedness"], -1, unit)),
         ("residual", _shared(report, "residual", unit)),
         ("fit error (6)", _shared(report, "fit_error", unit)),
         ("standard deviation of the height", _shared(report, "height_std", unit)),
@@ -67,7 +67,7 @@ def verdict(report: TouchReport, unit: Unit) -> str:
         count, where = early[0]
         number = "all" if count == stops.total() else f"{count} of {stops.total()}"
         return f"Good, with {number} half curves cut short {where}"
-    return f"Good: heights to ± {format_quantity(report['height_std'], 1, unit)}"
+    return f"Good: heights to ± {say(report['height_std'], 1, unit)}"
 
 
 def added_planes(report: TouchReport, unit: Unit) -> str:
@@ -75,9 +75,7 @@ def added_planes(report: TouchReport, unit: Unit) -> str:
     added = report["added_planes"]
     if not added:
         return "One more plane would not help much"
-    before, after = (
-        format_quantity(std, 1, unit) for std in (added[0]["height_std_before"], added[-1]["height_std"])
-    )
+    before, after = (say(std, 1, unit) for std in (added[0]["height_std_before"], added[-1]["height_std"]))
     azimuths = ", ".join(f"{plane['azimuth']:.0f}°" for plane in added)
     return f"Planes added at {azimuths}: ± {before} has become ± {after}"
 
@@ -100,11 +98,9 @@ def _tracked(report: TouchReport) -> str:
 def _lengths(report: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     """Rows with the lengths of a touch; for measured curves, how far they miss their common point."""
     names = [name for name in ("step", "extent", "radius") if name in report]
-    rows = [(", ".join(names), ", ".join(format_quantity(report[name], 1, unit) for name in names))]
+    rows = [(", ".join(names), ", ".join(say(report[name], 1, unit) for name in names))]
     if "misses" in report:
-        rows.append(
-            ("curves miss it by", ", ".join(format_quantity(miss, 1, unit) for miss in report["misses"]))
-        )
+        rows.append(("curves miss it by", ", ".join(say(miss, 1, unit) for miss in report["misses"])))
     return rows
 
 
@@ -133,9 +129,7 @@ def fit_summary(report: TouchReport) -> str:
 
 def curvatures(report: Mapping[str, Any], unit: Unit) -> str:
     """Both principal curvatures in words, without their standard deviations."""
-    return " and ".join(
-        format_quantity(known(report[key], report[f"{key}_std"]), -1, unit) for key in ("k1", "k2")
-    )
+    return " and ".join(say(known(report[key], report[f"{key}_std"]), -1, unit) for key in ("k1", "k2"))
 
 
 def _verification(report: TouchReport, unit: Unit) -> str:
@@ -145,7 +139,7 @@ def _verification(report: TouchReport, unit: Unit) -> str:
         return "no vertex of the mesh lies over the patch"
     mean, farthest = (
         _shared(report, "vertex_distance_mean", unit),
-        format_quantity(report["vertex_distance_max"], 1, unit),
+        say(report["vertex_distance_max"], 1, unit),
     )
     return f"mean {mean}; largest {farthest}; {report['vertices']} vertices"
 
@@ -155,7 +149,7 @@ def _verified_rows(found: Mapping[str, Any] | None, unit: Unit) -> list[tuple[st
     if found is None:
         return []
     names = [name for name in ("vertex", "contact") if f"{name}_distance_mean" in found]
-    more = f"{format_quantity(found['extra_fit_error'], 1, unit)}, " if "extra_fit_error" in found else ""
+    more = f"{say(found['extra_fit_error'], 1, unit)}, " if "extra_fit_error" in found else ""
     return [
         *((f"{name} distances", _spread(found, f"{name}_distance", unit)) for name in names),
         ("(6) on more curves", f"{more}{found['extra_points']} points on {found['extra_contours']} curves"),
@@ -173,14 +167,13 @@ def registration_summary(found: Registration) -> str:
 
 
 def _spread(found: Mapping[str, Any], what: str, unit: Unit) -> str:
-    return ", ".join(f"{key} {format_quantity(found[f'{what}_{key}'], 1, unit)}" for key in STATISTICS)
+    return ", ".join(f"{key} {say(found[f'{what}_{key}'], 1, unit)}" for key in SPREAD)
 
 
 def _suggestion(plane: SuggestedPlane, unit: Unit) -> str:
-    std = format_quantity(plane["expected_height_std"], 1, unit)
     return (
         f"azimuth {plane['azimuth']:.0f} degrees, along {vector(plane['tangent'])}; "
-        f"would take the standard deviation of the height to {std}"
+        f"would take the standard deviation of the height to {say(plane['expected_height_std'], 1, unit)}"
     )
 
 
@@ -192,15 +185,14 @@ def vector(v: Iterable[float]) -> str:
 
 
 def _measured(report: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
-    return format_quantity(report[key], power, unit, report[f"{key}_std"])
+    return say(report[key], power, unit, report[f"{key}_std"])
 
 
 def _shared(report: Mapping[str, Any], key: str, unit: Unit) -> str:
     """A length of the report in words, with its share of the radius."""
-    share = 100.0 * report[key] / report["radius"]
-    return f"{format_quantity(report[key], 1, unit)}, {share:.2f} % of the radius"
+    return f"{say(report[key], 1, unit)}, {100.0 * report[key] / report['radius']:.2f} % of the radius"
 
 
-def csv_cell(words: str) -> str:
+def cell(words: str) -> str:
     """Words as a cell of a table that no spreadsheet takes for a formula."""
     return f"'{words}" if words.startswith(FORMULAS) else words

@@ -12,7 +12,7 @@ from mathutils.geometry import intersect_line_plane
 
 from ..probes import anchor, probe, touch_again
 from ..touch import units
-from ..touch.settings import MAX_TILT, MOST_PLANES
+from ..touch.settings import MOST_PLANES, STEEPEST
 from ..touch.surface import MeshSurface
 from ..touch.touch_object import plane_axes
 from ..touch.types import Object, Outcome
@@ -112,7 +112,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
             value = SNAP * round(self._free / SNAP) if event.ctrl else self._free
         self._last = now
         if self.what == DRAG_TILT:
-            value = min(max(value, -MAX_TILT), MAX_TILT)
+            value = min(max(value, -STEEPEST), STEEPEST)
         self._set(context, value)
 
     def _slide(self, context: bpy.types.Context, event: bpy.types.Event) -> None:
@@ -121,9 +121,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
         depsgraph = context.evaluated_depsgraph_get()
         space: Any = context.space_data
         try:
-            surface = MeshSurface(
-                probe.probe_of(context.object).tactile_probe.target, depsgraph, vertices_checked=True
-            )
+            surface = MeshSurface(probe.probe_of(context.object).tactile_probe.target, depsgraph, sound=True)
             if not context.region_data.is_perspective:
                 origin -= space.clip_end * direction
             hit = surface.ray_cast(origin.to_tuple(), direction.to_tuple(), 4.0 * space.clip_end)
@@ -169,7 +167,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
         found = probe.probe_of(context.object)
         settings, self._value = found.tactile_probe, value
         if self.what == POINT:
-            anchor.set_probe_matrix(found, value)
+            anchor.put(found, value)
         elif self.what == DRAG_EXTENT:
             settings.extent = value
         else:
@@ -197,6 +195,6 @@ class TACTILE_OT_drag(bpy.types.Operator):
 def shown_probe(context: bpy.types.Context) -> Object | None:
     """The probe whose handles are shown: the active one, or that of the active patch or contours; or None."""
     found = probe.probe_of(context.object)
-    if found is None or not found.visible_get() or probe.why_locked(found) is not None:
+    if found is None or not found.visible_get() or probe.lock_of(found) is not None:
         return None
     return found if probe.record_of(found) is not None else None

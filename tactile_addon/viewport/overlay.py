@@ -19,7 +19,7 @@ from ..scene.contour_mesh import RIM_CORNERS
 from ..scene.viewports import shows_colors
 from ..stability_map import map_object
 from ..touch import units
-from ..touch.touch_object import TouchResult, plane_axes
+from ..touch.touch_object import Touched, plane_axes
 from ..touch.types import Array, Object
 
 # Each sampling plane has one of Okabe and Ito's colors, which color-blind readers can tell apart.
@@ -35,7 +35,7 @@ LETTERS, BESIDE = 48, 16  # Words beside the mouse have lines of so many letters
 BAR, NAVIGATION_GIZMO = (150, 12), (50, 290)
 
 
-def preview_lines(touched: TouchResult) -> list[tuple[Array, tuple[float, ...]]]:
+def preview_lines(touched: Touched) -> list[tuple[Array, tuple[float, ...]]]:
     """(points, color) of each line of a pick's preview: the rim of the patch, the normal and the contours."""
     r = touched.result
     edge = r.domain.boundary(RIM_CORNERS)
@@ -46,7 +46,7 @@ def preview_lines(touched: TouchResult) -> list[tuple[Array, tuple[float, ...]]]
     return [(np.vstack([edge, edge[:1]]), WHITE), (normal, WHITE), *curves]
 
 
-def draw_pick_legend(seen: dict[str, Any]) -> None:
+def draw_key(seen: dict[str, Any]) -> None:
     """Draws what the lines of the preview are, or beside the mouse why there is none."""
     context = bpy.context
     if not _is_over(context.region, seen["mouse"]):
@@ -139,7 +139,7 @@ def draw_legend() -> None:
     if not shows_colors(context.space_data) or _is_picking(context) or not _is_last_view(context):
         return
     obj = _active(context)
-    patch, record = probe.patch_for(obj), probe.record_of(obj)
+    patch, record = probe.patch_near(obj), probe.record_of(obj)
     if obj is not None and patch_record.ATLAS_RECORD in obj:
         patch, record = obj, obj[patch_record.ATLAS_RECORD]
     if record is not None and "color_limit" in record and patch.visible_get():
@@ -283,7 +283,7 @@ def _free_strip(context: bpy.types.Context, high: float) -> tuple[float, float, 
 # dict with the keys touched, the touch whose preview is drawn, or None; refusal, a sentence on why there is
 # none, or None; and mouse, where the mouse is in the window.
 DRAWINGS = ((draw_plane, "POST_VIEW"), (draw_legend, "POST_PIXEL"))
-PICK_DRAWINGS = ((draw_preview, "POST_VIEW"), (draw_pick_legend, "POST_PIXEL"))
+PICK_DRAWINGS = ((draw_preview, "POST_VIEW"), (draw_key, "POST_PIXEL"))
 
 
 def add_drawings(drawings: Iterable[tuple[Callable[..., None], str]], *given: Any) -> list[Any]:

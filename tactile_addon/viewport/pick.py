@@ -82,7 +82,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         active = context.view_layer.objects.active
         if active is not None and active.type == "MESH":
             show_size(max(active.dimensions[:]))
-        self._area, self._without_tree = context.area, large_meshes(context)
+        self._area, self._unread = context.area, large_meshes(context)
         for name in NAMES:  # Blender remembers those of the last pick, which suited another object.
             self.properties.property_unset(name)
         try:
@@ -166,7 +166,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
             anchor.attach(found, target)
         for name in NAMES:
             setattr(settings, name, getattr(self, name))
-        touch_again.apply_touch(found, touched, depsgraph, complete=True)
+        touch_again.adopt(found, touched, depsgraph, complete=True)
         settings.is_probe = True
         make_active(context, found)
         show_colors(context.space_data)
@@ -209,7 +209,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         words = short = "Move over a mesh to touch it"
         self._seen |= {"touched": None, "refusal": None, "mouse": (event.mouse_x, event.mouse_y)}
         try:
-            self._read(context, names_below(context, event, self._without_tree))
+            self._read(context, names_below(context, event, self._unread))
             found = point_below(context, event)
             if found is not None:
                 obj, location, eye = found
@@ -233,7 +233,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         """Prepares large meshes for their first touch, and says so, because it takes a while."""
         if not names:
             return
-        self._without_tree.difference_update(names)
+        self._unread.difference_update(names)
         self._area.header_text_set(f"Pick Reference Point     Reading {', '.join(names)} for the first touch")
         context.window.cursor_modal_set("WAIT")
         bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)

@@ -18,12 +18,12 @@ WITHIN = 0.05  # The mesh is looked for along the normal within this share of it
 PLACES, SEED = 10_000, 0  # So many places of the mesh's faces are compared, and at most as many vertices.
 AT_ONCE, BACK_AT_ONCE = 1000, 300  # A step compares so many places of the surface, or of the mesh.
 FACES_AT_ONCE = 10_000  # A tree has so many faces, because making a larger one takes too long for a step.
-RAY_COUNT = 40  # A place is hidden if rays in so many directions all meet the mesh again.
+WAYS = 40  # A place is hidden if rays in so many directions all meet the mesh again.
 LIFT = 1e-4  # They begin this share of the size away from it.
 GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 
 
-class SurfaceDistance:
+class BothWays:
     """The deviations of a surface from the mesh that was touched, and back, found step by step.
 
     deviation : (n,), signed distances of the surface's vertices from the mesh, positive outside it
@@ -44,24 +44,24 @@ class SurfaceDistance:
         corners, triangles = self._mesh.vertices, self._mesh.triangles
         normals = self._mesh.normals
         yield 0.0
-        yield from part_of(self._distances_to_mesh(corners, normals, self.deviation), 0.0, 0.3)
+        yield from part_of(self._off_target(corners, normals, self.deviation), 0.0, 0.3)
         a, b, c = corners[triangles].transpose(1, 0, 2)
         normals = np.cross(b - a, c - a)
         areas = np.linalg.norm(normals, axis=1)
         normals /= np.maximum(areas, 1e-300)[:, None]
         middles, off = (a + b + c) / 3.0, np.zeros(len(areas))
         yield 0.3
-        yield from part_of(self._distances_to_mesh(middles, normals, off), 0.3, 0.7)
+        yield from part_of(self._off_target(middles, normals, off), 0.3, 0.7)
         there, places = np.average(np.abs(off), weights=areas), self._places()
         yield 0.7
         trees = yield from self._trees()
         back = []
         for points in places:
-            off = yield from self._distances_to_surface(points, trees)
+            off = yield from self._off_surface(points, trees)
             back.append(off.mean() if len(off) else 0.0)
         self.mean = 0.5 * float(there + back[0])
 
-    def _distances_to_mesh(self, points: Array, normals: Array, off: Array) -> Generator[float, None, None]:
+    def _off_target(self, points: Array, normals: Array, off: Array) -> Generator[float, None, None]:
         """Fills in the signed distances (n,) of points (n, 3) of the surface; yields the share done."""
         for start in range(0, len(points), AT_ONCE):
             some = slice(start, start + AT_ONCE)
@@ -72,7 +72,7 @@ class SurfaceDistance:
                     nearest = self._target.project(points[start + i].tolist())[2]
                     found[i] = math.copysign(min(abs(found[i]), nearest), found[i])
             off[some] = found
-            self._update_maximum(points[some], np.abs(found))
+            self._note(points[some], np.abs(found))
             yield start / len(points)
 
     def _places(self) -> tuple[Array, Array]:
@@ -93,7 +93,7 @@ class SurfaceDistance:
             yield 0.7
         return trees
 
-    def _distances_to_surface(self, points: Array, trees: list[BVHTree]) -> Generator[float, None, Array]:
+    def _off_surface(self, points: Array, trees: list[BVHTree]) -> Generator[float, None, Array]:
         """The distances of those points (n, 3) of the mesh that are not hidden; yields the share done."""
         found = [np.zeros(0)]
         for start in range(0, len(points), BACK_AT_ONCE):
@@ -102,7 +102,7 @@ class SurfaceDistance:
             yield 0.8
             far = (off > self._tolerance).tolist()
             seen = np.array([not (far[i] and self._is_hidden(point)) for i, point in enumerate(some)])
-            self._update_maximum(some[seen], off[seen])
+            self._note(some[seen], off[seen])
             found.append(off[seen])
             yield 0.8
         return np.concatenate(found)
@@ -114,7 +114,7 @@ class SurfaceDistance:
         rays = zip(starts, DIRECTIONS.tolist(), strict=True)
         return all(self._target.ray_cast(start, way, 2.0 * size) is not None for start, way in rays)
 
-    def _update_maximum(self, points: Array, off: Array) -> None:
+    def _note(self, points: Array, off: Array) -> None:
         """Keeps the largest of the distances (n,) of points (n, 3)."""
         if len(off) and off.max() > self.largest:
             self.largest, self.place = float(off.max()), points[np.argmax(off)]
@@ -131,9 +131,9 @@ def _nearest(trees: list[BVHTree], point: Sequence[float]) -> float:
 
 
 def _directions() -> Array:
-    """Unit vectors (RAY_COUNT, 3) all round."""
-    z = 1.0 - (2.0 * np.arange(RAY_COUNT) + 1.0) / RAY_COUNT
-    turn, out = GOLDEN * np.arange(RAY_COUNT), np.sqrt(1.0 - z**2)
+    """Unit vectors (WAYS, 3) all round."""
+    z = 1.0 - (2.0 * np.arange(WAYS) + 1.0) / WAYS
+    turn, out = GOLDEN * np.arange(WAYS), np.sqrt(1.0 - z**2)
     return np.column_stack([out * np.cos(turn), out * np.sin(turn), z])
 
 

@@ -16,10 +16,10 @@ from ..touch.wording import many
 from .object_report import LEAST_NUMBER
 from .object_touches import tolerance_of
 
-TRIAL_COUNT, SEED = 12, 0  # So many touches are made to know.
+TRIED, SEED = 12, 0  # So many touches are made to know.
 # A touch with its part of joining takes so many times as long as one that is tried, and a mesh as long as
 # so many of these: python -m benchmarks.add_menu.
-JOIN_COST, MESH_COST = 3.3, 60.0
+JOINING, MESHING = 3.3, 60.0
 
 
 class Expected:
@@ -55,10 +55,10 @@ def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, f
     begin = perf_counter()
     a, b, c = mesh.points[mesh.triangles].transpose(1, 0, 2)
     area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
-    points, normals = core.scattered(mesh.points, mesh.triangles, TRIAL_COUNT, np.random.default_rng(SEED))
+    points, normals = core.scattered(mesh.points, mesh.triangles, TRIED, np.random.default_rng(SEED))
     touches = core.expected_touches(mesh, points, normals, area, tolerance=tolerance, noise=noise, rng=SEED)
-    each = (perf_counter() - begin) / TRIAL_COUNT
-    return _rounded(touches), (MESH_COST + JOIN_COST * touches) * each
+    each = (perf_counter() - begin) / TRIED
+    return _rounded(touches), (MESHING + JOINING * touches) * each
 
 
 def _rounded(number: float) -> int:

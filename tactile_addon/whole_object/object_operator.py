@@ -8,8 +8,8 @@ import bpy
 from bpy.props import EnumProperty, FloatVectorProperty, IntProperty
 
 from ..probes import probe
-from ..probes.in_slices import Progress, SlicedOperator
-from ..probes.number_fields import with_length_fields
+from ..probes.in_slices import InSlices, Progress
+from ..probes.number_fields import dragged
 from ..probes.operators import (
     fields_of,
     has_target,
@@ -18,7 +18,7 @@ from ..probes.operators import (
     target_object,
 )
 from ..scene import patch_record
-from ..touch.settings import NOISE, TARGET, UNSAVED, draw_auto, length_property
+from ..touch.settings import NOISE, TARGET, UNSAVED, draw_chosen, length_property
 from ..touch.types import Outcome
 from ..touch.wording import sentence
 from . import kept, whole_mesh
@@ -33,8 +33,8 @@ ACCURACIES = [
 ]
 
 
-@with_length_fields
-class TACTILE_OT_touch_all_over(SlicedOperator, bpy.types.Operator):
+@dragged
+class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
     """Touch an object all over, from one point on, and join the patches to one surface"""
 
     bl_idname = "tactile.touch_all_over"
@@ -84,7 +84,7 @@ class TACTILE_OT_touch_all_over(SlicedOperator, bpy.types.Operator):
         return is_in_object_mode(cls, context, "Objects are touched") and has_target(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
-        return self._confirm(context)
+        return self._ask(context)
 
     def _go_on(self, context: bpy.types.Context) -> Outcome:
         self._growing = whole_mesh.GrowingPatches(context.scene, self._touches.surface)
@@ -115,7 +115,7 @@ class TACTILE_OT_touch_all_over(SlicedOperator, bpy.types.Operator):
             shown = len(self._touches.found)
             yield
 
-    def _progress(self) -> Progress:
+    def _done(self) -> Progress:
         if self._touches.is_stopped:
             self.stop = "Drop It"
         share = self._touches.share
@@ -127,13 +127,13 @@ class TACTILE_OT_touch_all_over(SlicedOperator, bpy.types.Operator):
     def _stopped(self, context: bpy.types.Context) -> Outcome:
         """Has the patches so far joined. If Esc is pressed again, or during meshing, nothing is kept."""
         if self._touches.is_stopped or not self._touches.found:
-            self._cleanup(context)
+            self._leave(context)
             return {"CANCELLED"}
         self._touches.stop()
         return {"RUNNING_MODAL"}
 
-    def _cleanup(self, context: bpy.types.Context) -> None:
-        super()._cleanup(context)
+    def _leave(self, context: bpy.types.Context) -> None:
+        super()._leave(context)
         if self._growing is not None:
             self._growing.remove()
             self._growing = None
@@ -166,8 +166,8 @@ class TACTILE_OT_touch_all_over(SlicedOperator, bpy.types.Operator):
         row = layout.row()
         row.active = not self.tolerance
         row.prop(self, "accuracy", expand=True)
-        draw_auto(layout, self, "tolerance", fields=fields)
-        draw_auto(layout, self, "edge", fields=fields)
+        draw_chosen(layout, self, "tolerance", fields=fields)
+        draw_chosen(layout, self, "edge", fields=fields)
         layout.prop(self, "most")
         layout.prop(self, fields["noise"])
         layout.prop(self, "seed")

@@ -35,7 +35,7 @@ def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("patches", f"{record['patches']}, of which {record['in_doubt']} alone would be in doubt"),
         ("edges of their graph", record["edges"]),
         ("tolerance", _tolerance(record)),
-        ("standard deviation of the height", units.format_quantity(record["height_std"], 1, unit)),
+        ("standard deviation of the height", units.say(record["height_std"], 1, unit)),
         ("distance from the mesh", off and f"mean {off}; largest {deviation(record, 'max')}"),
         ("largest distance at", _place(record)),
         (
@@ -60,7 +60,7 @@ def object_verdict(record: Mapping[str, Any]) -> str:
 
 def object_summary(record: Mapping[str, Any]) -> str:
     """A sentence on what was found of a whole object."""
-    std = units.format_quantity(record["height_std"], 1, unit_of(record))
+    std = units.say(record["height_std"], 1, unit_of(record))
     if "touches" in record:
         touches, off = many(record["touches"], "touch", "touches"), deviation(record, "mean")
         return f"{verdict_of(record)}: {touches}; {_surface(record)}; {off} off the mesh on average"
@@ -77,7 +77,7 @@ def object_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("Surface", "Closed" if record["is_closed"] else "Incomplete" if record.get("uncovered") else "Open"),
         ("Rims Left", record.get("uncovered") or None),
         ("Tolerance", _tolerance(record)),
-        ("Height", f"± {units.format_quantity(record['height_std'], 1, unit_of(record))}"),
+        ("Height", f"± {units.say(record['height_std'], 1, unit_of(record))}"),
         ("Off the Mesh", deviation(record, "mean")),
         ("Patches", record["patches"]),
         ("Edge Length", _edge(record)),
@@ -100,7 +100,7 @@ def _surface(record: Mapping[str, Any]) -> str:
 
 
 def _edge(record: Mapping[str, Any]) -> str | None:
-    return units.format_quantity(record["edge"], 1, unit_of(record)) if "edge" in record else None
+    return units.say(record["edge"], 1, unit_of(record)) if "edge" in record else None
 
 
 def _unknown(record: Mapping[str, Any]) -> str | None:
@@ -111,7 +111,7 @@ def _unknown(record: Mapping[str, Any]) -> str | None:
 
 def _tolerance(record: Mapping[str, Any]) -> str | None:
     """The tolerance in words, or None if measured contacts have chosen it."""
-    return units.format_quantity(record["tolerance"], 1, unit_of(record)) if record["tolerance"] else None
+    return units.say(record["tolerance"], 1, unit_of(record)) if record["tolerance"] else None
 
 
 def deviation(record: Mapping[str, Any], what: str) -> str | None:
@@ -120,7 +120,7 @@ def deviation(record: Mapping[str, Any], what: str) -> str | None:
     if off is None:
         return None
     # In single precision a little is left of 0.
-    return units.format_quantity(off if off > ZERO * record["size"] else 0.0, 1, unit_of(record))
+    return units.say(off if off > ZERO * record["size"] else 0.0, 1, unit_of(record))
 
 
 def _place(record: Mapping[str, Any]) -> str | None:

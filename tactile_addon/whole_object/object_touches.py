@@ -12,11 +12,11 @@ import numpy as np
 
 from ... import core
 from ..touch.detached_mesh import DetachedMesh
-from ..touch.touch_object import MAX_OFFSET_SHARE, nearest_point
+from ..touch.touch_object import AWAY, nearest_point
 from ..touch.types import Array, Object
 from ..touch.units import length
 from ..touch.wording import many
-from .both_ways import SurfaceDistance
+from .both_ways import BothWays
 from .object_report import unit_of
 from .whole_surface import WholeSurface
 
@@ -80,7 +80,7 @@ class ObjectTouches:
         self._start = None
         if location is not None:
             at = np.subtract(location, self.surface.origin)
-            self._start = nearest_point(obj.name, self.surface, at, MAX_OFFSET_SHARE * self.surface.size)
+            self._start = nearest_point(obj.name, self.surface, at, AWAY * self.surface.size)
 
     def _require_lengths(self, noise: float, edge: float) -> None:
         """Raises ValueError, with a sentence, for lengths that are too large or too small for this object."""
@@ -188,7 +188,7 @@ class ObjectTouches:
             self.share = start + (1.0 - start) * 0.6 * share
             yield
         self.words = "Comparing"
-        self.compared = SurfaceDistance(self.surface, self.whole.mesh, self.tolerance)
+        self.compared = BothWays(self.surface, self.whole.mesh, self.tolerance)
         for share in self.compared.steps():
             self.share = start + (1.0 - start) * (0.6 + 0.4 * share)
             yield
@@ -236,7 +236,7 @@ class ObjectTouches:
             return status, message
         if self.compared.largest > OFF_TOLERANCES * self.tolerance:
             off = length(self.compared.largest, unit)
-            if self.surface.has_boundary_edges() and not (self.edge and status == "ok"):
+            if self.surface.has_rims() and not (self.edge and status == "ok"):
                 return "uncertain", (
                     f"The surface is up to {off} off the object, whose mesh has open edges, as around holes: "
                     "close them, or use a smaller tolerance."

@@ -8,13 +8,13 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from ..probes.in_slices import Progress, SlicedOperator
-from ..probes.number_fields import fields, with_length_fields
+from ..probes.in_slices import InSlices, Progress
+from ..probes.number_fields import dragged, fields
 from ..probes.operators import is_in_object_mode, make_active, polls, report_error
 from ..scene import patch_record
 from ..scene.mesh_data import own_mesh
 from ..touch.arrays import read_array
-from ..touch.settings import draw_auto, length_property
+from ..touch.settings import draw_chosen, length_property
 from ..touch.types import Object, Outcome, Point
 from . import kept, whole_mesh
 from .object_report import object_summary
@@ -75,8 +75,8 @@ def _select_nearest(mesh: bpy.types.Mesh, place: Point) -> Any:
     return mesh.vertices[nearest]
 
 
-@with_length_fields
-class TACTILE_OT_mesh_again(SlicedOperator, bpy.types.Operator):
+@dragged
+class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
     """Make the surface again with edges of another length, from the same touches"""
 
     bl_idname = "tactile.mesh_again"
@@ -125,7 +125,7 @@ class TACTILE_OT_mesh_again(SlicedOperator, bpy.types.Operator):
     def _check(self, context: bpy.types.Context) -> None:
         self._object(context)
 
-    def _progress(self) -> Progress:
+    def _done(self) -> Progress:
         share = self._touches.share
         return f"{self._touches.words}: {share:.0%}", share
 
@@ -141,7 +141,7 @@ class TACTILE_OT_mesh_again(SlicedOperator, bpy.types.Operator):
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
         size = surface_of(context)[patch_record.ATLAS_RECORD]["size"]
-        draw_auto(layout, self, "edge", fields=fields(size))
+        draw_chosen(layout, self, "edge", fields=fields(size))
 
 
 CLASSES = (TACTILE_OT_look_farthest, TACTILE_OT_mesh_again)

@@ -38,7 +38,7 @@ class GrowingPatches:
         # It is not drawn in front: patches on the far side would show through.
         obj.matrix_world = Matrix.Translation(list(surface.origin))
         scene.collection.objects.link(obj)  # A collection of its own might be left empty.
-        with undo.outside_undo_step():  # There is an undo step when the operator ends.
+        with undo.after_step():  # There is an undo step when the operator ends.
             undo.note_added(obj)
         obj.data.materials.append(emission("Tactile Surface", attribute=COLOR))
         self._patches: list[tuple[Array, Array]] = []

@@ -79,7 +79,7 @@ class WholeSurface:
             "is_closed": mesh.is_closed and not atlas.uncovered,
             "vertices": len(mesh.vertices),
             "triangles": len(mesh.triangles),
-            "edge": _median_edge_length(mesh),
+            "edge": _edge(mesh),
             "unknown_curvatures": int(np.isinf(self.curvatures["mean_curvature_std"]).sum()),
             "height_std": float(mesh.std[np.isfinite(mesh.std)].mean()),  # It is inf where nothing was felt.
             "radius": float(np.median([r.radius for r in atlas.patches])),
@@ -87,20 +87,18 @@ class WholeSurface:
 
     def _verdict(self) -> tuple[str, str]:
         """The status and the message of the atlas, unless its surface has holes only as it is shown."""
-        if self.atlas.status == "ok" and _boundary_loop_count(self.mesh) > _boundary_loop_count(
-            self.atlas.reference.mesh
-        ):
+        if self.atlas.status == "ok" and _rims(self.mesh) > _rims(self.atlas.reference.mesh):
             return "uncertain", "Triangles of this edge length leave holes: use a shorter edge length."
         return self.atlas.status, self.atlas.message
 
 
-def _median_edge_length(mesh: core.Mesh) -> float:
+def _edge(mesh: core.Mesh) -> float:
     """The typical length of a mesh's edges."""
     ends = mesh.vertices[mesh.triangles]
     return float(np.median(np.linalg.norm(ends - np.roll(ends, 1, axis=1), axis=2)))
 
 
-def _boundary_loop_count(mesh: core.Mesh) -> int:
+def _rims(mesh: core.Mesh) -> int:
     """The number of rims of a mesh: where its object ends, and around holes."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components

@@ -111,7 +111,7 @@ def registered():
 def own():
     """What only the extension can tell: how many drawings and commands it has, whether its timer runs."""
     addon, live = (sys.modules[f"{MODULE}.tactile_addon{name}"] for name in ("", ".probes.change_handlers"))
-    return len(addon._drawings), len(addon._commands), bpy.app.timers.is_registered(live._complete_pending)
+    return len(addon._drawings), len(addon._commands), bpy.app.timers.is_registered(live._settle)
 
 
 def enabling():

@@ -94,7 +94,7 @@ def is_outdated():
 def fresh():
     """How far off the curvatures of the patch are from those of a touch made now, in 1 / radius."""
     module = type(probe().tactile_probe).__module__.rpartition(".")[0]
-    touched = sys.modules[f"{module}.touch_again"].touch_probe(
+    touched = sys.modules[f"{module}.touch_again"].touch_at(
         probe(), bpy.context.evaluated_depsgraph_get(), complete=True
     )
     record = patch()["tactile"]

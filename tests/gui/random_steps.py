@@ -31,7 +31,7 @@ taken = []
 def is_quiet():
     """Whether no gesture goes on, and no timer of the extension is left."""
     timers = (
-        sys.modules[f"{ADDON}.probes.change_handlers"]._complete_pending,
+        sys.modules[f"{ADDON}.probes.change_handlers"]._settle,
         sys.modules[f"{ADDON}.probes.deleted"].remove,
     )
     windows = bpy.context.window_manager.windows

@@ -115,7 +115,7 @@ def test_the_patch_of_a_probe_is_where_its_probe_is(empty, suzanne, extension):
     assert empty.ops.tactile.pick(target=suzanne.name, location=place, extent=0.3) == {"FINISHED"}
     with pytest.raises(RuntimeError, match="is that of its probe, so it is known already"):
         empty.ops.tactile.register(target=suzanne.name)
-    patch = extension.tactile_addon.probes.probe.patch_for(empty.context.object)
+    patch = extension.tactile_addon.probes.probe.patch_near(empty.context.object)
     registration, report = (
         extension.tactile_addon.comparison.register_operator,
         extension.tactile_addon.touch.wording,

@@ -31,9 +31,9 @@ def pick(bpy, location, **arguments):
 @pytest.fixture
 def touches(extension, monkeypatch):
     """A list that grows by one with each touch of a probe."""
-    found, touch_probe = [], extension.tactile_addon.probes.touch_again.touch_probe
-    counting = lambda probe, *given, **named: found.append(probe.name) or touch_probe(probe, *given, **named)  # noqa: E731
-    monkeypatch.setattr(extension.tactile_addon.probes.touch_again, "touch_probe", counting)
+    found, touch_at = [], extension.tactile_addon.probes.touch_again.touch_at
+    counting = lambda probe, *given, **named: found.append(probe.name) or touch_at(probe, *given, **named)  # noqa: E731
+    monkeypatch.setattr(extension.tactile_addon.probes.touch_again, "touch_at", counting)
     return found
 
 
@@ -118,7 +118,7 @@ def test_a_target_that_is_scaled_is_touched_again_by_a_patch_without_shear(
     assert off.length < 1e-3
     if live:
         depsgraph = empty.context.evaluated_depsgraph_get()
-        fresh = extension.tactile_addon.probes.touch_again.touch_probe(probe, depsgraph, complete=True)
+        fresh = extension.tactile_addon.probes.touch_again.touch_at(probe, depsgraph, complete=True)
         assert patch["tactile"]["k1"] == pytest.approx(fresh.result.patch.k1, rel=1e-4, abs=1e-4)
         close((fresh.result.frame.origin, patch.matrix_world.translation))
 

@@ -65,15 +65,13 @@ def test_while_the_point_is_dragged_extent_and_verdict_are_those_of_its_end(empt
     first = report_of(patch)
     extents = []
     for x in np.linspace(-0.58, 0.0, 15):
-        (with_length_fields,) = slide(empty, probe, patch, [x])
-        assert not with_length_fields["is_verified"]
-        assert probe.empty_display_size == pytest.approx(
-            0.6 * with_length_fields["extent"]
-        )  # the handles fit the patch
+        (dragged,) = slide(empty, probe, patch, [x])
+        assert not dragged["is_verified"]
+        assert probe.empty_display_size == pytest.approx(0.6 * dragged["extent"])  # the handles fit the patch
         gesture(empty, probe)
         ended = report_of(patch)
         assert ended["is_verified"]
-        assert [with_length_fields[name] for name in COMMON] == [ended[name] for name in COMMON]
+        assert [dragged[name] for name in COMMON] == [ended[name] for name in COMMON]
         extents.append(ended["extent"])
     assert extents[-1] < 0.5 * first["extent"]
     assert probe.tactile_probe.extent == 0.0
@@ -94,19 +92,19 @@ def test_at_the_end_of_a_gesture_the_patch_is_that_of_a_fresh_touch(empty, ridge
     empty.context.collection.objects.link(copy)
     gesture(empty, probe)
     gesture(empty, copy)
-    with_length_fields, (fresh,) = report_of(patch), copy.children
+    dragged, (fresh,) = report_of(patch), copy.children
     fresh = report_of(fresh)
-    for report in (with_length_fields, fresh):
+    for report in (dragged, fresh):
         for name in ("seconds", "patch", "contours"):
             del report[name]
-    assert with_length_fields == fresh
+    assert dragged == fresh
 
 
 def test_a_number_of_an_array_that_is_set_is_answered_once(empty, ridge, gesture, extension, monkeypatch):
     """Blender calls back twice for it. A value set again is answered if something else has changed."""
     handlers, looked = extension.tactile_addon.probes.change_handlers, []
-    inner = handlers._update_probe
-    monkeypatch.setattr(handlers, "_update_probe", lambda *given: looked.append(1) or inner(*given))
+    inner = handlers._look_at
+    monkeypatch.setattr(handlers, "_look_at", lambda *given: looked.append(1) or inner(*given))
     probe, patch = pick(empty, ridge, -0.6)
     looked.clear()
     probe.tactile_probe.azimuths[0] = 0.1

@@ -11,7 +11,7 @@ pytest.importorskip("bpy", reason="needs Blender as a Python module: run make te
 
 def test_a_slice_ends_when_its_time_is_over_and_the_next_one_goes_on(extension):
     done = []
-    operator = extension.tactile_addon.probes.in_slices.SlicedOperator()
+    operator = extension.tactile_addon.probes.in_slices.InSlices()
     operator._steps = (done.append(number) for number in range(3))
     assert not operator._advance(None, -1.0)  # its time is over after the first step
     assert done == [0]
@@ -22,9 +22,9 @@ def test_a_slice_ends_when_its_time_is_over_and_the_next_one_goes_on(extension):
 
 def test_a_slice_is_as_long_as_the_redraw_before_it(extension):
     in_slices = extension.tactile_addon.probes.in_slices
-    operator = in_slices.SlicedOperator()
+    operator = in_slices.InSlices()
     assert operator._slice() == in_slices.LONGEST_SLICE  # There was none before.
-    operator._last_slice_end = perf_counter() - 0.5 * in_slices.LONGEST_SLICE
+    operator._worked = perf_counter() - 0.5 * in_slices.LONGEST_SLICE
     assert 0.5 * in_slices.LONGEST_SLICE <= operator._slice() <= in_slices.LONGEST_SLICE
-    operator._last_slice_end = perf_counter() + 60.0
+    operator._worked = perf_counter() + 60.0
     assert operator._slice() == in_slices.TIMER_SLICE

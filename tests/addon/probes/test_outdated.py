@@ -108,12 +108,12 @@ def test_whatever_a_waiting_probe_has_not_felt_makes_its_patch_outdated(empty, b
 
 def test_without_a_window_every_frame_has_time_for_a_touch(empty, extension, probe, monkeypatch):
     live = extension.tactile_addon.probes.change_handlers
-    monkeypatch.setattr(live, "_update_probe", counting := Counting(live._update_probe))
+    monkeypatch.setattr(live, "_look_at", counting := Counting(live._look_at))
     empty.context.scene.frame_set(2)
     assert counting.in_time == [True]  # without a window a touch is always in time
     record_of(probe)["seconds"]["touch"] = 1.0
     assert live._seconds(probe) > live.CHEAP
-    live._update_probe(probe, empty.context.evaluated_depsgraph_get(), {}, False)
+    live._look_at(probe, empty.context.evaluated_depsgraph_get(), {}, False)
     assert said(probe)[0] == "ok"  # nothing has changed
     empty.context.scene.frame_set(3)
     assert said(probe)[0] == "ok"

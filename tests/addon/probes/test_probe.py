@@ -776,10 +776,7 @@ def test_lengths_are_said_in_the_unit_of_the_scene(empty, extension, system, len
     if system != "NONE":
         settings.length_unit = length
     unit = units.unit_of(empty.context.scene, size)
-    assert (
-        ", ".join(units.format_quantity(*given, unit) for given in ((0.0123, 1), (-4.2, -1), (17.64, -2)))
-        == said
-    )
+    assert ", ".join(units.say(*given, unit) for given in ((0.0123, 1), (-4.2, -1), (17.64, -2))) == said
 
 
 @pytest.mark.parametrize(

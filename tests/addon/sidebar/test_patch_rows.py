@@ -36,8 +36,8 @@ def record(status="ok", message="The patch describes its contacts.", **more):
 
 def test_a_number_that_is_only_rounding_beside_its_deviation_is_0(extension):
     units = extension.tactile_addon.touch.units
-    assert units.format_quantity(3.34e-7, -1, UNIT, 7e-4) == "0 ± 0.0007 1/mm"
-    assert units.format_quantity(-0.002, -1, UNIT, 7e-4) == "-0.002 ± 0.0007 1/mm"
+    assert units.say(3.34e-7, -1, UNIT, 7e-4) == "0 ± 0.0007 1/mm"
+    assert units.say(-0.002, -1, UNIT, 7e-4) == "-0.002 ± 0.0007 1/mm"
     flat = {"k1": 2e-40, "k2": -1e-7, "k1_std": 0.01, "k2_std": 0.01}
     assert extension.tactile_addon.touch.wording.curvatures(flat, UNIT) == "0 1/mm and 0 1/mm"
 

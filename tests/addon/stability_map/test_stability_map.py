@@ -16,7 +16,7 @@ from scenes import datablocks, made, positions, values
 
 import core
 
-PATCH, _, CREASE, EDGE, _, NO_VALUE = range(6)
+PATCH, _, CREASE, EDGE, _, NOTHING = range(6)
 QUANTITIES = ("error", "height_std", "reach", "condition_number", "blind_share")
 
 
@@ -355,7 +355,7 @@ def test_faces_of_no_area_are_nothing_to_feel(empty):
     obj.data.update()
     painted, record = stability_map(empty, spacing=0.01, extent=0.2)
     assert record["patches"] == 0
-    assert np.all(values(painted.data, "reason") == NO_VALUE)
+    assert np.all(values(painted.data, "reason") == NOTHING)
     assert "error_median" not in record
     for name in (*QUANTITIES, "reason"):
         painted.tactile_map_colors = name

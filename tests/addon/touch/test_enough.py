@@ -98,9 +98,9 @@ def test_while_a_gesture_goes_on_the_extent_is_that_of_its_end(empty, sheet, ext
     empty.ops.tactile.pick(target="Grid", location=PLACE, new=True)
     probe = empty.context.object
     probe.location.x += 0.3
-    touch_probe = extension.tactile_addon.probes.touch_again.touch_probe
+    touch_at = extension.tactile_addon.probes.touch_again.touch_at
     depsgraph = empty.context.evaluated_depsgraph_get()
-    going, ended = (touch_probe(probe, depsgraph, complete=complete).report for complete in (False, True))
+    going, ended = (touch_at(probe, depsgraph, complete=complete).report for complete in (False, True))
     assert (going["extent"], going["message"]) == (ended["extent"], ended["message"])
     stops = {stop for pair in going["stops"] for stop in pair}
     assert stops == {"fit no longer matched", "no contact"}
@@ -132,7 +132,7 @@ def test_no_patch_across_an_edge_or_a_rib(empty, extension, scans, name, noise):
             touched = add_on.touch.touch_object.touch(obj, depsgraph, at, planes, **inputs)
         except ValueError:  # there is no patch on a crease or beside one
             continue
-        touched = add_on.touch.touch_object.with_verification(touched)
+        touched = add_on.touch.touch_object.completed(touched)
         if touched.report["status"] == "ok":
             trusted += 1
             off = extension.core.height_error(touched.result, touched.surface)

@@ -81,7 +81,7 @@ def test_what_touches_bridge_is_told(empty, extension, ball, touches_of):
     ball.data.update()
     empty.context.view_layer.update()
     other = touches_of(ball)
-    both_ways = extension.tactile_addon.whole_object.both_ways.SurfaceDistance
+    both_ways = extension.tactile_addon.whole_object.both_ways.BothWays
     touches.compared = both_ways(other.surface, touches.whole.mesh, touches.tolerance)
     shares = list(touches.compared.steps())
     assert shares == sorted(shares)
