@@ -231,6 +231,7 @@ def test_probes_do_not_share_what_they_write(empty, ball):
     first.tactile_probe.azimuths[1] = 0.7
     assert report_of(one)["planes"][1][0] == pytest.approx(math.degrees(0.7))
     assert is_marked(other)
+    one.tactile_range = 1.0  # Overlapping patches would share one that follows from both.
     before = state(one)
     second.tactile_probe.extent = 0.4
     assert not is_marked(other)
