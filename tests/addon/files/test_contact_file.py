@@ -374,7 +374,7 @@ def test_rows_are_read_many_at_a_time_and_take_little_memory(read, extension, mo
     points, text = rows_of(count)
     text = text.replace(",", ";").replace(".", ",") if change[0] == "." else text.replace(*change)
     looked = []
-    monkeypatch.setattr(extension.core.contact_data.rows.RowReader, "_row", lambda *_: looked.append(1))
+    monkeypatch.setattr(extension.core.contact_data.rows.RowReader, "_parse_row", lambda *_: looked.append(1))
     header = "curve;x;y;z\n" if change[0] == "." else "curve,x,y,z\n"
     tracemalloc.start()
     try:
@@ -410,9 +410,11 @@ def test_a_line_of_millions_of_words_is_refused_before_it_takes_memory(read, dat
 
 def test_one_bad_row_costs_no_more_than_its_neighbors(read, extension, monkeypatch):
     count, looked = 50_000, []
-    row = extension.core.contact_data.rows.RowReader._row
+    row = extension.core.contact_data.rows.RowReader._parse_row
     monkeypatch.setattr(
-        extension.core.contact_data.rows.RowReader, "_row", lambda *given: looked.append(1) or row(*given)
+        extension.core.contact_data.rows.RowReader,
+        "_parse_row",
+        lambda *given: looked.append(1) or row(*given),
     )
     _, text = rows_of(count)
     with pytest.raises(ValueError, match=f'line {count + 2}, column "y": expected a number, got "three"'):
@@ -422,7 +424,7 @@ def test_one_bad_row_costs_no_more_than_its_neighbors(read, extension, monkeypat
 
 def test_empty_lines_are_not_looked_at_one_by_one(read, extension, monkeypatch):
     rows, seen = extension.core.contact_data.rows, []
-    says = rows._says
+    says = rows.is_row
     monkeypatch.setattr(rows, "is_row", lambda line: seen.append(1) or says(line))
     for blank in ("\n", " \n", "\r\n"):
         (contour,), _ = read(f"{blank * 300_000}x,y,z\n{blank * 300_000}0,0,0\n#\n{blank * 300_000}1,2,3\n")
