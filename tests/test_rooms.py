@@ -18,6 +18,7 @@ ROOMS = {
         "arguments",
         "lapack",
         "steps",
+        "triangles",
         "contours",
         "contact_data",
         "patch",
