@@ -121,9 +121,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     if options.file is not None:
         mesh_file.open_file(options.file)
     if options.command == "table":
-        patches = patch_table.patches_of(bpy.context.view_layer.objects)
-        patch_table.write(options.output, patches, bpy.context.scene)
-        return {"rows": len(patches)}
+        return {"rows": _write_table(options.output)}
     arguments = _arguments(options)
     before: set[Object] = set(bpy.data.objects)
     command = COMMANDS[options.command]
@@ -214,6 +212,13 @@ def _save(path: Path, made: Object) -> None:
         mesh_file.write(path, made)
     else:
         mesh_file.save_scene(path)
+
+
+def _write_table(path: Path) -> int:
+    """Writes the table of the scene's patches, and returns their number."""
+    patches = patch_table.patches_of(bpy.context.view_layer.objects)
+    patch_table.write(path, patches, bpy.context.scene)
+    return len(patches)
 
 
 def _default_target() -> str:

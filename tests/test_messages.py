@@ -42,7 +42,7 @@ def sentences(node):
         return [node.value]
     if isinstance(node, ast.Assign) and getattr(node.targets[0], "attr", None) == "message":
         return [node.value]
-    if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", None) == "stopped":
+    if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", None) in ("stopped", "message"):
         return [node.value]
     if isinstance(node, ast.AugAssign) and getattr(node.target, "id", None) == "message":
         return [node.value]

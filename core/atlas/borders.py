@@ -62,20 +62,12 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
 
     def off(points: Array, which: Indices) -> Generator[float, None, Array]:
         """How far the surface is above points (k, 3) beside some of the places, (k,)."""
-        up = normals[which]
-        contacts = yield from _contacts(partial(finger.near, length=near), points, up)
-        return np.array(
-            [
-                np.nan if contact is None else np.dot(n, np.subtract(contact[0], p))
-                for contact, p, n in zip(contacts, points, up, strict=True)
-            ]
-        )
+        return _above(partial(finger.near, length=near), points, normals[which])
 
     lengths, ended = yield from _lengths(off, places, ways, STEP * mesh.edge)
     places = places + lengths[:, None] * ways
     places += np.nan_to_num((yield from off(places, np.arange(len(at)))))[:, None] * normals
-    step = STEP * mesh.edge
-    ahead = partial(finger.ahead, radius=2.0 * step, s=step)
+    ahead = partial(finger.ahead, radius=2.0 * STEP * mesh.edge, s=STEP * mesh.edge)
     beyond = yield from _contacts(ahead, places, normals, ways)
     ended &= [contact is None for contact in beyond]  # Elsewhere the surface bends away.
     some = ended[before] & ended[after]
@@ -92,6 +84,15 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
     starts, ends = np.concatenate([a[~sharp], a[sharp], c]), np.concatenate([b[~sharp], c, b[sharp]])
     outward = np.concatenate([(one + two)[~sharp], one[sharp], two[sharp]])
     return Border(np.stack([starts, ends], axis=1), outward, c)
+
+
+def _above(
+    near: Callable[..., Contact | None], points: Array, normals: Array
+) -> Generator[float, None, Array]:
+    """How far the surface is above points (k, 3) along normals (k, 3), (k,); NaN where it is not."""
+    contacts = yield from _contacts(near, points, normals)
+    feet = np.array([np.full(3, np.nan) if contact is None else contact[0] for contact in contacts])
+    return row_dot(feet.reshape(-1, 3) - points, normals)
 
 
 def _contacts(

@@ -77,11 +77,11 @@ class Charts:
         """
         reach = np.minimum(REACH, near / self.radii)
         found = [
-            self._pairs_at(points, reach, margin, *some) for some in self.candidates(points, reach, margin)
+            self._pairs_at(points, reach, margin, *some) for some in self._candidates(points, reach, margin)
         ]
         return Pairs(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
-    def candidates(
+    def _candidates(
         self, points: Array, reach: Array, margin: float
     ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         """Pairs of places and patches that may be within reach, sorted by place, about CHUNK at once."""
@@ -157,11 +157,11 @@ class Charts:
         distance = (z - h - hx * (x - foot_x) - hy * (y - foot_y)) * steep
         aside = (x - foot_x) ** 2 + (y - foot_y) ** 2 + (z - h) ** 2 - distance**2
         std = self.stds_at(foot_x, foot_y, patch) * steep
-        normal = self.to_world_directions(patch, np.array([-hx * steep, -hy * steep, steep]))
+        normal = self._to_world_directions(patch, np.array([-hx * steep, -hy * steep, steep]))
         pairs = Pairs(place, patch, rho, distance * radius, normal, std * radius)
         return pairs.chosen((aside < ASIDE**2) & (np.abs(distance) < reach[patch]) & (steep > STEEPEST))
 
-    def to_world_directions(self, patch: NDArray[np.intp], local: Array) -> Array:
+    def _to_world_directions(self, patch: NDArray[np.intp], local: Array) -> Array:
         """Directions (3, m) in the frames of patches, as the caller sees them, (m, 3)."""
         return np.einsum("mij,jm->mi", self.axes[patch], local)
 
@@ -260,7 +260,7 @@ class Charts:
         """Points and normals (m, 3) of patches above local (x, y), which are in unit radius."""
         h, hx, hy = self._heights(x, y, patch)
         steep = 1.0 / np.sqrt(1.0 + hx**2 + hy**2)
-        points = self.origins[patch] + self.to_world_directions(
+        points = self.origins[patch] + self._to_world_directions(
             patch, np.array([x, y, h]) * self.radii[patch]
         )
-        return points, self.to_world_directions(patch, np.array([-hx * steep, -hy * steep, steep]))
+        return points, self._to_world_directions(patch, np.array([-hx * steep, -hy * steep, steep]))

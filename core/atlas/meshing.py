@@ -188,7 +188,7 @@ def meshed(
     yield 0.9
     surface = surface.chosen(np.append(every, parents))
     surface = surface._replace(std=np.hypot(surface.std, CONTINUED_STD * unfelt))
-    return (yield from trim_unfelt(vertices, triangles, surface, indicator, ended, contacts))
+    return (yield from _trim_unfelt(vertices, triangles, surface, indicator, ended, contacts))
 
 
 def _level(indicator: Indicator, size: float) -> Generator[float, None, tuple[Array, Array, Indices]]:
@@ -253,13 +253,13 @@ def _project_and_smooth(
     Folded triangles, and vertices that are still off the surface, are projected again, at most STEPS times.
     Yields the share that is done.
     """
-    surface = yield from project_onto_surface(charts, indicator, vertices, up, band)
+    surface = yield from _project_onto_surface(charts, indicator, vertices, up, band)
     far = np.abs(surface.distance) > FAR * indicator.cell
     yield from _reproject(charts, indicator, vertices, up, surface, far, band)
     for _ in range(SMOOTHINGS):
         vertices = smoothed(vertices, surface.normal, triangles)
         yield 0.5
-    surface = yield from project_onto_surface(charts, indicator, vertices, up, band)
+    surface = yield from _project_onto_surface(charts, indicator, vertices, up, band)
     for _ in range(STEPS):
         far = np.abs(surface.distance) > FAR * indicator.cell
         folded = _folded(vertices, surface.normal, triangles)
@@ -283,7 +283,7 @@ def _reproject(
     """Moves some of the vertices (k, 3) onto the surface again, and changes both in place."""
     some = np.flatnonzero(which)
     moved = vertices[some]
-    again = yield from project_onto_surface(charts, indicator, moved, up[some], band)
+    again = yield from _project_onto_surface(charts, indicator, moved, up[some], band)
     for old, new in zip((vertices, *surface), (moved, *again), strict=True):
         old[some] = new
 
@@ -296,7 +296,7 @@ def _folded(vertices: Array, normals: Array, triangles: Indices) -> NDArray[np.b
     return folded
 
 
-def project_onto_surface(
+def _project_onto_surface(
     charts: Charts, indicator: Indicator, vertices: Array, up: Array, band: float
 ) -> Generator[float, None, SurfaceSample]:
     """Moves vertices (k, 3) onto the surface, in place; returns the surface where they were before."""
@@ -315,7 +315,7 @@ def project_onto_surface(
     return surface
 
 
-def trim_unfelt(
+def _trim_unfelt(
     vertices: Array,
     triangles: Indices,
     surface: SurfaceSample,
@@ -346,12 +346,9 @@ def trim_unfelt(
         far = np.linalg.norm(triangle_cross(vertices[beyond]), axis=1) / 6.0 * (~near[beyond]).sum(axis=1)
         gone |= ~inside & (np.bincount(piece[beyond[:, 0]], far, count) > BRIDGED * indicator.cell**2)[piece]
     else:
-        outer, off = np.flatnonzero(~inside & ~gone), np.zeros(count)
-        for start in range(0, len(outer), PLACES_AT_ONCE):
-            some = outer[start : start + PLACES_AT_ONCE]
-            off += np.bincount(piece[some], np.where(ended(vertices[some]), 1.0, -1.0), count)
-            yield 0.9
-        gone[outer] = off[piece[outer]] > 0.0
+        outer = np.flatnonzero(~inside & ~gone)
+        (off,) = yield from chunked(lambda some: (ended(some),), PLACES_AT_ONCE, 0.9, vertices[outer])
+        gone[outer] = (np.bincount(piece[outer], np.where(off, 1.0, -1.0), count) > 0.0)[piece[outer]]
     yield 0.9
     some = np.flatnonzero(gone)
     if contacts is not None:

@@ -182,14 +182,25 @@ def _fit(
     if flip is not (unknown and bulges > FLAT):
         result = reconstruct(outward=-result.frame.axes[:, 2])
     require_single("patch", result.radius, result.frame.origin)
-    axes = reference_axes(result.frame.axes[:, 2])
     report: TouchReport = {
         "source": source,
         "unit": unit,
         "curves": len(contours),
         "strokes": len(strokes),
         "given_contacts": sum(len(contour.points) for contour in felt),
-        "method": options["method"],
+        **_report(result, options["method"]),
+    }
+    if distances is not None:
+        report["misses"] = distances.tolist()
+    report["seconds"] = {"fit": perf_counter() - start}
+    return Touched(None, result, report)
+
+
+def _report(result: core.Reconstruction, method: str) -> TouchReport:
+    """What a fit has found, in the form of a touch's report."""
+    axes = reference_axes(result.frame.axes[:, 2])
+    return {
+        "method": method,
         "degree": result.patch.degree,
         **reconstruction_report(result),
         "axes": axes.tolist(),
@@ -197,10 +208,6 @@ def _fit(
         **measures(result),
         "suggested_plane": suggestion_report(result, axes),
     }
-    if distances is not None:
-        report["misses"] = distances.tolist()
-    report["seconds"] = {"fit": perf_counter() - start}
-    return Touched(None, result, report)
 
 
 def _mean_normal(contours: Sequence[core.Contour]) -> Array:

@@ -85,21 +85,8 @@ def touch(
         outward = [-v for v in outward]
     axes = reference_axes(outward, tangent)
     clock.append(perf_counter())
-    found = _explored(
-        surface,
-        point,
-        outward,
-        planes,
-        farthest=FARTHEST_SHARE * surface.size,
-        extent=extent or "auto",
-        step=step or "auto",
-        noise=noise,
-        rng=seed,
-        tangent=axes[:, 0],
-        tolerance=tolerance,
-        most_planes=MOST_PLANES,
-        **fit,
-    )
+    more = {"rng": seed, "tangent": axes[:, 0], "tolerance": tolerance, "noise": noise, **fit}
+    found = _explored(surface, point, outward, planes, extent, step, **more)
     clock.append(perf_counter())
     require_single("patch", found.result.radius, found.result.frame.origin)
     report: TouchReport = {
@@ -119,14 +106,24 @@ def touch(
     return Touched(surface, found.result, report)
 
 
-def _explored(surface: MeshSurface, point: Point, *where: Any, **given: Any) -> core.Exploration:
+def _explored(
+    surface: MeshSurface,
+    point: Point,
+    outward: Point,
+    planes: Sequence[core.SamplingPlane],
+    extent: float,
+    step: float,
+    **more: Any,
+) -> core.Exploration:
     """What core.explore finds. Where facets are longer than some steps, an error says so."""
+    more |= {"farthest": FARTHEST_SHARE * surface.size, "most_planes": MOST_PLANES}
     try:
-        return core.explore(surface, point, *where, **given)
+        return core.explore(
+            surface, point, outward, planes, extent=extent or "auto", step=step or "auto", **more
+        )
     except core.DegenerateCurvesError as error:
-        step = {"auto": FINEST_STEP * surface.size}.get(given["step"], given["step"])
         facet = surface.facet(point)
-        if given["noise"] or facet < LARGE_FACET * step:
+        if more["noise"] or facet < LARGE_FACET * (step or FINEST_STEP * surface.size):
             raise
         raise ValueError(
             f"{error}. The facets there are {length(facet)} long: add a Subdivision modifier if the "

@@ -29,7 +29,7 @@ from ..touch.settings import (
     draw_all,
     touch_arguments,
 )
-from ..touch.touch_object import touch
+from ..touch.touch_object import Touched, touch
 from ..touch.types import Object, Outcome
 from ..touch.wording import curvatures, sentence, verdict
 from . import overlay
@@ -147,14 +147,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         try:
             moved = self._inherit(context)
             target = target_object(context, self.target)
-            given = self.properties.is_property_set
-            touched = touch(
-                target,
-                depsgraph,
-                list(self.location) if given("location") else context.scene.cursor.location.to_tuple(),
-                toward=list(self.outward) if given("outward") else None,
-                **touch_arguments(self),
-            )
+            touched = self._touch(context, target, depsgraph)
         except ValueError as error:
             return report_error(self, error)
         found = moved or probe.make(context, target)
@@ -175,6 +168,16 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         unit = units.unit_of(context.scene, report["radius"])
         self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, verdict(report, unit))
         return {"FINISHED"}
+
+    def _touch(self, context: bpy.types.Context, target: Object, depsgraph: bpy.types.Depsgraph) -> Touched:
+        given = self.properties.is_property_set
+        return touch(
+            target,
+            depsgraph,
+            list(self.location) if given("location") else context.scene.cursor.location.to_tuple(),
+            toward=list(self.outward) if given("outward") else None,
+            **touch_arguments(self),
+        )
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
