@@ -70,8 +70,7 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
     ahead = partial(finger.ahead, radius=2.0 * STEP * mesh.edge, s=STEP * mesh.edge)
     beyond = yield from _contacts(ahead, places, normals, ways)
     ended &= [contact is None for contact in beyond]  # Elsewhere the surface bends away.
-    some = ended[before] & ended[after]
-    before, after = before[some], after[some]
+    before, after = (side[ended[before] & ended[after]] for side in (before, after))
     corners, sharp = _corners(places, before, after, mesh.edge)
     a, b = places[before], places[after]
     chords = 0.5 * (a + b)

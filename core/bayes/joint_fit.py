@@ -83,7 +83,7 @@ def joint_fit(
     """
     floor = np.maximum(given.noise, MISFIT)
     axes, usual = _first_axes(given.contacts, weights, k1, k2), np.full(len(k1), USUAL_WAVINESS)
-    state = _State(axes, k1, k2, weights, prior_variances(usual), floor.copy())
+    state = _State(axes, k1, k2, weights, prior_variances(usual), floor)
     return _passes(given._replace(noise=floor), state, 0, through)
 
 
@@ -145,7 +145,7 @@ def _pass(
     tangent = np.where(settled[:, None], given.tangent, state.axes[..., 0])
     updates = [frame_update(*touch) for touch in zip(state.axes, mean, tangent, strict=True)]
     axes, k1, k2, angle = (np.array(values) for values in zip(*updates, strict=True))
-    state = state._replace(axes=axes, k1=k1, k2=k2, weights=weights)
+    state = _State(axes, k1, k2, weights, hyper.prior, hyper.noise)
     if not settled.any():
         return state, settled, None
     surface = posterior_given(mean, data, hyper).rotated(angle)
@@ -155,15 +155,13 @@ def _pass(
 
 
 def _hyperparameters(state: _State, data: Sextics, floor: Array, step: int) -> Hyperparameters:
-    """Waviness and noise, which are found anew after the first pass and while there are outliers.
-
-    Those of `state` are changed in place.
-    """
+    """Waviness and noise, which are found anew after the first pass and while there are outliers."""
     stale = ((state.weights > 0.0) & (state.weights < 1.0)).any(axis=1) | (step == 1)
-    if stale.any():
-        for values, new in zip(state[-2:], data.hyperparameters(floor, stale), strict=False):
-            values[stale] = new
-    return Hyperparameters(state.prior, state.noise)
+    if not stale.any():
+        return Hyperparameters(state.prior, state.noise)
+    found, prior, noise = data.hyperparameters(floor, stale), state.prior.copy(), state.noise.copy()
+    prior[stale], noise[stale] = found.prior, found.noise
+    return Hyperparameters(prior, noise)
 
 
 def posterior_of(k1: float, k2: float, contacts: Array, noise: float) -> SurfacePosterior:

@@ -165,8 +165,7 @@ def _fit(
 ) -> Touched:
     start = perf_counter()
     contours, unit, of_file, up, strokes = contacts
-    point = of_file if point is None else point
-    outward = up if outward is None else outward
+    point, outward = of_file if point is None else point, up if outward is None else outward
     if normal_std:
         contours = [c if c.normals is None else replace(c, normal_std=normal_std) for c in contours]
     distances = None
