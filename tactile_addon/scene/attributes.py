@@ -18,19 +18,17 @@ NORMAL, PLACE = "custom_normal", "domain_place"  # Normals for shading; places o
 NODE = "patch"  # The node of a whole object's graph whose patch counts most.
 CONTOUR, CONTACT = "contour", "contact"  # Numbers of contours, and of contacts along them, -1 for none.
 MEASURES = ("error", HEIGHT_STD, "reach", "condition_number", "blind_share")  # Of a stability map,
-REASON, TOUCHED, MAP_COLOR = "reason", "is_touched", "stability_color"  # and so are these.
+REASON, MAP_COLOR = "reason", "stability_color"  # and so are these.
 TYPES: dict[str, Any] = {
     **dict.fromkeys((*CURVATURES, GAUSSIAN_STD, CURVATURE_STD, DEVIATION, HEIGHT_STD, *MEASURES), "FLOAT"),
     **dict.fromkeys((POSITION, NORMAL, PLACE), "FLOAT_VECTOR"),
     **dict.fromkeys((COLOR, MAP_COLOR), "FLOAT_COLOR"),
     **dict.fromkeys((NODE, CONTOUR, CONTACT, REASON), "INT"),
-    TOUCHED: "BOOLEAN",
 }
 # The property of an attribute's data that has its values, by the attribute's type.
 KEYS = {
     "FLOAT": "value",
     "INT": "value",
-    "BOOLEAN": "value",
     "FLOAT_VECTOR": "vector",
     "FLOAT_COLOR": "color",
 }

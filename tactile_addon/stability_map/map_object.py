@@ -10,7 +10,7 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ..scene import colors, patch_object, patch_record
-from ..scene.attributes import HEIGHT_STD, MAP_COLOR, MEASURES, POSITION, REASON, TOUCHED
+from ..scene.attributes import HEIGHT_STD, MAP_COLOR, MEASURES, REASON
 from ..scene.mesh_data import emission, write
 from ..scene.shown import LEAST_RANGE
 from ..scene.viewports import show_colors
@@ -20,6 +20,7 @@ from ..touch.types import Array, Object
 from .stability import NOTHING, REASON_KEYS, REASONS, StabilityMap
 
 SHADES = 256
+PLACES = "tactile_places"  # The points that were touched, in the axes of the map: three numbers each.
 # The map is shown this share of the object's size above the mesh. With less it flickers if it is 20000 clip
 # starts away, as a scan in mm is.
 SHOWN_ABOVE = 5e-3
@@ -68,6 +69,8 @@ def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Ob
     above: Any = painted.modifiers.new("Above the Mesh", "DISPLACE")
     above.mid_level, above.strength = 0.0, SHOWN_ABOVE * math.dist(painted.bound_box[0], painted.bound_box[6])
     _paint(mesh, touched)
+    places = np.array(touched.places[: touched.done]).reshape(-1, 3) + touched.surface.origin
+    painted[PLACES] = _applied(np.linalg.inv(_array(painted.matrix_basis)), places).ravel().tolist()
     mesh.materials.clear()
     mesh.materials.append(emission("Tactile Stability", attribute=MAP_COLOR))
     painted[patch_record.MAP_RECORD] = touched.report() | {"source": obj.name, "painted": painted.name}
@@ -82,9 +85,6 @@ def _paint(mesh: bpy.types.Mesh, touched: StabilityMap) -> None:
     for name in MEASURES:
         write(mesh, name, touched.measures[name][touched.nearest])
     write(mesh, REASON, touched.reason[touched.nearest])
-    is_touched = np.zeros(len(mesh.vertices), dtype=bool)
-    is_touched[touched.chosen[: touched.done]] = True
-    write(mesh, TOUCHED, is_touched)
     write(mesh, MAP_COLOR, np.ones((len(mesh.vertices), 4)))
     mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = MAP_COLOR
 
@@ -136,17 +136,23 @@ def touched_near(painted: Object, location: list[float]) -> list[float]:
 
     It is the location itself if that point is farther away than the spacing, as where the target was moved.
     """
-    mesh = painted.data
-    if TOUCHED not in mesh.attributes:
+    if PLACES not in painted:
         return location
-    is_touched = read_array(mesh.attributes[TOUCHED].data, "value", dtype=bool)
-    co = read_array(mesh.attributes[POSITION].data, "vector", 3)
-    matrix = np.array(painted.matrix_world, dtype=float)
-    places = co[is_touched] @ matrix[:3, :3].T + matrix[:3, 3]
+    places = _applied(_array(painted.matrix_world), np.reshape(painted[PLACES], (-1, 3)))
     away = np.linalg.norm(places - np.array(location), axis=1)
     nearest = int(np.argmin(away)) if len(away) else None
     is_near = nearest is not None and away[nearest] <= painted[patch_record.MAP_RECORD]["spacing"]
     return places[nearest].tolist() if is_near else location
+
+
+def _array(matrix: Any) -> Array:
+    return np.array(matrix, dtype=float)
+
+
+def _applied(matrix: Array, points: Array) -> Array:
+    """Points (n, 3) as a matrix (4, 4) places them."""
+    placed: Array = points @ matrix[:3, :3].T + matrix[:3, 3]
+    return placed
 
 
 def inputs_of(painted: Object) -> dict[str, Any]:

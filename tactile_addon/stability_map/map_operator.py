@@ -77,7 +77,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def _done(self) -> Progress:
-        done, count = self._map.done, len(self._map.chosen)
+        done, count = self._map.done, len(self._map.places)
         return f"Stability Map: {done} of {count} points", done / max(count, 1)
 
     def _check(self, context: bpy.types.Context) -> None:

@@ -17,7 +17,7 @@ from ..touch.detached_mesh import DetachedMesh
 from ..touch.evaluated_mesh import evaluated_object, size_of
 from ..touch.touch_object import FARTHEST_SHARE, LEAST_STEPS, require_fine, require_lengths
 from ..touch.touch_report import stops_at
-from ..touch.types import Object
+from ..touch.types import Array, Object, Point, Triple
 from ..touch.units import length
 
 EXTENT_SHARE = 1.0 / 8.0  # This share of the object's size stands for an extent that touches choose.
@@ -48,13 +48,16 @@ def expected_count(obj: Object, depsgraph: bpy.types.Depsgraph, extent: float, s
     extent = extent or EXTENT_SHARE * size_of(evaluated, linear)
     area = float(read_array(evaluated.data.polygons, "area").sum())
     area *= abs(np.linalg.det(linear)) ** (2.0 / 3.0)
-    return min(len(evaluated.data.vertices), core.spaced_count(area, spacing or SPACING_SHARE * extent))
+    triangles = len(evaluated.data.loops) - 2 * len(evaluated.data.polygons)
+    return min(triangles, core.spaced_count(area, spacing or SPACING_SHARE * extent))
 
 
 class StabilityMap:
-    """Touches of an evaluated mesh at vertices that are spaced evenly.
+    """Touches of an evaluated mesh in the middle of triangles that are spaced evenly.
 
-    chosen : indices of the n vertices to touch, in random order
+    At its vertices a coarse mesh has creases, and most clicks are elsewhere.
+
+    places : n arrays (3,), the places to touch as the surface has them, in random order
     done : how many of these have been touched
     measures, reason : (n,), what was found by each touch; the fields of `measures` are MEASURES
     nearest : index of the touch that is nearest to each vertex of the mesh, once the steps are done
@@ -95,18 +98,18 @@ class StabilityMap:
         self.planes, self.noise, self.seed, self.fit = planes, noise, seed, fit
         self._rng = np.random.default_rng(seed)
         _rehearse(planes, fit, **self._glance)
-        self.chosen: list[int] = []
+        self.places: list[Array] = []
         self.done = 0
 
     def steps(self) -> Iterator[None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
-        surface = self.surface
-        candidates = np.flatnonzero(surface.has_face)
-        for index in core.spaced(surface.points[candidates], self.spacing, self._rng):
+        middles = self.surface.points[self.surface.triangles].mean(axis=1)
+        yield
+        for index in core.spaced(middles, self.spacing, self._rng):
             if index is not None:
-                self.chosen.append(int(candidates[index]))
+                self.places.append(middles[index])
             yield
-        count = len(self.chosen)
+        count = len(self.places)
         self.measures = np.full(count, NOTHING, dtype=[(name, float) for name in MEASURES])
         self.reason = np.full(count, REASON_KEYS.index("nothing"), dtype=np.int32)
         batch = BATCH if self.extent else GROWING_BATCH
@@ -122,7 +125,7 @@ class StabilityMap:
         from scipy.spatial import cKDTree
 
         points = self.surface.points
-        tree = cKDTree(points[self.chosen[: self.done]])
+        tree = cKDTree(self.places[: self.done])
         self.nearest = np.empty(len(points), dtype=np.intp)
         for start in range(0, len(points), NEAREST_AT_ONCE):
             self.nearest[start : start + NEAREST_AT_ONCE] = tree.query(
@@ -132,7 +135,6 @@ class StabilityMap:
 
     def _touch(self, numbers: Sequence[int]) -> Iterator[None]:
         """Makes the touches with these numbers, as a generator like `steps`."""
-        surface, chosen = self.surface, [self.chosen[number] for number in numbers]
         options = core.ExplorationOptions(
             self.planes,
             farthest=self._farthest,
@@ -142,23 +144,27 @@ class StabilityMap:
             rng=self._rng,
             **self.fit,
         )
-        found = yield from core.exploring_many(
-            surface, surface.points[chosen], surface.normals[chosen], options
-        )
-        for number, vertex, touch in zip(numbers, chosen, found, strict=True):
+        feet: dict[int, tuple[Triple, Triple]] = {}
+        for number in numbers:
+            try:
+                feet[number] = self.surface.project(self.places[number].tolist())[:2]
+            except ValueError:  # The face has no area, which is the reason until there is another.
+                continue
+        points, normals = np.reshape([*feet.values()], (-1, 2, 3)).swapaxes(0, 1)
+        found = yield from core.exploring_many(self.surface, points, normals, options)
+        for (number, foot), touch in zip(feet.items(), found, strict=True):
             if isinstance(touch, ValueError):
-                self.reason[number] = self._why_none(vertex)
-            elif ended := stops_at(touch.contours, surface.points[vertex]):
+                self.reason[number] = self._why_none(*foot)
+            elif ended := stops_at(touch.contours, foot[0]):
                 self.reason[number] = _reason_of(ended)
             else:
                 self._note(number, touch)
             yield
 
-    def _why_none(self, vertex: int) -> int:
-        """The code of the reason why there is no touch at a vertex."""
-        surface, point = self.surface, self.surface.points[vertex]
+    def _why_none(self, point: Point, normal: Point) -> int:
+        """The code of the reason why there is no touch at a point."""
         try:
-            contours = core.track(surface, point, surface.normals[vertex], self.planes, **self._glance)
+            contours = core.track(self.surface, point, normal, self.planes, **self._glance)
         except ValueError:  # The settings are valid, so a face there has no area.
             return REASON_KEYS.index("nothing")
         shortest = min(contours, key=lambda contour: len(contour.points))
@@ -183,7 +189,7 @@ class StabilityMap:
         reasons = Counter(self.reason[: self.done].tolist())
         counts = {key: reasons[code] for code, key in enumerate(REASON_KEYS)}
         report = {
-            "points": len(self.chosen),
+            "points": len(self.places),
             "touched": self.done,
             "patches": counts.pop("patch") + counts["doubt"],
             "in_doubt": counts.pop("doubt"),

@@ -24,7 +24,7 @@ class DetachedMesh(PlacedMesh):
     it.
 
     name, matrix : name and transform of the object
-    points, normals : (n, 3), of the vertices; has_face : (n,), whether they belong to a face
+    points : (n, 3), of the vertices; has_face : (n,), whether they belong to a face
     faces : (m, 3), the first three vertices of each face
     triangles : (k, 3), all faces in triangles, counterclockwise from outside
     size : the longest edge of the box around all faces, in the world
@@ -32,7 +32,6 @@ class DetachedMesh(PlacedMesh):
     """
 
     points: Array
-    normals: Array
 
     def __init__(self, obj: Object, depsgraph: bpy.types.Depsgraph) -> None:
         """Raises ValueError, with a sentence, if `obj` cannot be touched."""
@@ -46,7 +45,6 @@ class DetachedMesh(PlacedMesh):
         self.spacing = farthest * np.finfo(np.float32).eps
         mesh = evaluated.data
         mesh.calc_loop_triangles()
-        normals = read_array(mesh.vertex_normals, "vector", 3)
         corners = read_array(mesh.loops, "vertex_index", dtype=np.int32)
         starts = read_array(mesh.polygons, "loop_start", dtype=np.int32)
         self.triangles = read_array(mesh.loop_triangles, "vertices", 3, np.int32)
@@ -57,8 +55,7 @@ class DetachedMesh(PlacedMesh):
         self.has_face = np.bincount(corners, minlength=len(co)) > 0
         # Loose vertices cannot be touched and may be far away.
         self.size = float((np.ptp(co[self.has_face], axis=0) * np.linalg.norm(linear, axis=0)).max())
-        self.points, self.normals = co @ linear.T, normals @ np.linalg.inv(linear)
-        self.normals /= np.maximum(np.linalg.norm(self.normals, axis=1, keepdims=True), 1e-30)
+        self.points = co @ linear.T
         try:
             # Its rays take half the time of the object's own.
             self._tree = BVHTree.FromObject(obj, depsgraph)
