@@ -14,7 +14,15 @@ COLOR_STOPS = np.array([
     (253, 219, 199), (244, 165, 130), (214, 96, 77), (178, 24, 43),
 ]) / 255.0  # fmt: skip
 
+SURE = 2.0  # What is within so many deviations of 0 has the color of 0.
 UNKNOWN = (0.5, 0.5, 0.5, 1.0)  # The color of what has no value, in sRGB.
+
+
+def beyond_doubt(values: Array, stds: Array) -> Array:
+    """Values (n,) with deviations (n,), shrunk by as much as these leave open (James and Stein, 1961)."""
+    doubt = np.minimum(SURE * stds, np.abs(values))
+    shrunk: Array = values - np.divide(doubt**2, values, out=np.zeros_like(values), where=values != 0.0)
+    return shrunk
 
 
 def symmetric_range(values: Array, floor: float) -> float:

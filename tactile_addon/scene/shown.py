@@ -11,7 +11,7 @@ import numpy as np
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object
 from . import colors
-from .attributes import COLOR, CURVATURE_STD, CURVATURES
+from .attributes import COLOR, CURVATURE_STD, CURVATURES, STD_OF
 from .mesh_data import ABOVE, own_mesh, values
 from .patch_record import (
     ATLAS_RECORD,
@@ -42,6 +42,8 @@ def recolor(obj: Object) -> None:
     shades, record = values(mesh, shown), obj[RECORD if RECORD in obj else ATLAS_RECORD]
     floor = LEAST_RANGE * record["radius"] ** POWERS[shown]
     unknown = _unknown(mesh) if shown in CURVATURES else []
+    if STD_OF.get(shown) in mesh.attributes:
+        shades = colors.beyond_doubt(shades, values(mesh, STD_OF[shown]))
     curvedness = np.delete(values(mesh, "curvedness"), unknown)
     if shown == "gaussian_curvature" and len(curvedness):
         # |K| is at most the square of the curvedness. Far below that, as on a cylinder, it is as good as 0.
