@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..bayes.posterior import CONFIDENCE, terms_to
-from ..contours.contour import SURFACE_ENDS
+from ..contours.contour import SURFACE_ENDS, UNEXPLAINED
 from ..patch.domain import AT_POINT
 
 # benchmarks.stability chose these, and benchmarks.real LIKELY and what taps say. A fit is in doubt beyond
@@ -178,16 +178,21 @@ def _about_heights(r: Judged) -> Iterator[str]:
 def _about_frame(r: Judged) -> Iterator[str]:
     turn = r.posterior.turn(LIKELY if r.posterior.amplitude else CONFIDENCE)
     if turn > DOUBTFUL_TURN and not r.posterior.is_round:
-        yield (
-            f"The principal directions may be {math.degrees(turn):.0f} degrees off: use a longer "
-            "extent or add sampling planes."
-        )
+        yield (f"The principal directions may be {math.degrees(turn):.0f} degrees off: {_more_bend(r)}.")
     std = r.posterior.curvature_std()
     if std > DOUBTFUL_CURVATURE:
         yield (
             f"Curvatures are accurate to only {std / r.radius:.2g} in the least known direction: "
-            "use a longer extent or add sampling planes."
+            f"{_more_bend(r)}."
         )
+
+
+def _more_bend(r: Judged) -> str:
+    """What shows more of the curvatures: curves that surface or fit have ended do not become longer."""
+    stops = {stop for contour in r.contours for stop in contour.stops or ()}
+    if stops.intersection(SURFACE_ENDS):
+        return "use a shorter extent, move the point away from the edge, or add sampling planes"
+    return "add sampling planes" if UNEXPLAINED in stops else "use a longer extent or add sampling planes"
 
 
 def _about_curves(r: Judged) -> Iterator[str]:

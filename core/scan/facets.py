@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the contacts of a touch lie on so few facets that its curvature is theirs, not the shape's."""
+"""Whether the curvature of a touch is that of the facets it has felt, not of the shape they stand for."""
 
 import math
 from collections.abc import Callable
@@ -12,10 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import Array
+from ..patch.differential_geometry import Derivatives
+from ..patch.monge import exponents, monomials
 from ..reconstruction.result import Reconstruction
 
 # benchmarks.facets chose these.
-FEW = 12  # On fewer facets a curvature is off by some .8 to 1.2 of the larger one; on more, by .3.
+FEW = 8  # On fewer facets a curvature is off by about as much as the larger one is;
+SEVERAL = 20  # on fewer than this number too, if a paraboloid has other curvatures,
+OTHER = 0.28  # by this share of the largest one.
 MANY = 40  # If contacts lie on this number of faces, the mesh is fine, even where it is flat.
 # Edges between these angles stand for a smooth bend,
 DISTINCT_COSINE, SMOOTH_COSINE = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))
@@ -35,7 +39,10 @@ class Facet(NamedTuple):
 def has_few_facets(
     r: Reconstruction, face_near: Callable[[Array], int], corners_of: Callable[[int], ArrayLike]
 ) -> bool:
-    """Whether contacts lie on fewer than FEW facets of different directions, which stand for a smooth shape.
+    """Whether contacts lie on so few facets, which stand for a smooth shape, that the curvature is theirs.
+
+    Facets of different directions count. Fewer than FEW are too few. Fewer than SEVERAL are, if the
+    paraboloid nearest to the same contacts, which cannot follow facets, has other curvatures.
 
     face_near : the number of the face nearest to a point (3,) of the world
     corners_of : the corners (k, 3) of a face in the world, in order
@@ -53,10 +60,21 @@ def has_few_facets(
         touched[face] = facet
         if all(facet.normal @ normal < DISTINCT_COSINE for normal in distinct):
             distinct.append(facet.normal)
-        if len(distinct) == FEW or len(touched) == MANY:
+        if len(distinct) == SEVERAL or len(touched) == MANY:
             return False
+    if len(distinct) >= FEW and not _follows_facets(r, points):
+        return False
     nearest = islice(touched.values(), FEW)
     return any(_is_smooth(facet, r.radius, lambda at: shape(face_near(at))) for facet in nearest)
+
+
+def _follows_facets(r: Reconstruction, points: Array) -> bool:
+    """Whether the paraboloid nearest to points (n, 3) of the world has other curvatures than the fit."""
+    x, y, z = r.frame.to_local(points).T / r.radius
+    b = np.linalg.lstsq(monomials(x, y, exponents(1, 2)), z, rcond=None)[0]
+    even = Derivatives(np.zeros(()), b[0], b[1], 2.0 * b[2], b[3], 2.0 * b[4]).principal_curvatures
+    both = np.array([even, (r.radius * r.k1, r.radius * r.k2)])
+    return bool(np.abs(np.ptp(both, axis=0)).max() > OTHER * np.abs(both).max())
 
 
 def _is_smooth(facet: Facet, radius: float, facet_near: Callable[[Array], Facet]) -> bool:

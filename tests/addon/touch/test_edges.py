@@ -32,6 +32,23 @@ def test_a_patch_of_a_given_extent_says_where_its_curves_ended_before(empty, cub
     assert "half curves" not in report_of(empty, (0.1, 0.2, 1.0), extent=0.5)["message"]
 
 
+@pytest.mark.parametrize("place", [(-0.89, 1.0, 0.013), (0.55, 1.0, -0.016), (0.18, -1.0, -0.023)])
+def test_where_edges_end_curves_a_longer_extent_is_not_advised(empty, cube, place):
+    """A probe on the rim of a plate: a shorter extent helps, and more planes do."""
+    cube.scale.z = 0.05
+    empty.context.view_layer.update()
+    record = report_of(empty, place)
+    assert record["status"] == "uncertain"
+    assert (
+        ": use a shorter extent, move the point away from the edge, or add sampling planes."
+        in record["message"]
+    )
+    assert report_of(empty, place, extent=0.05)["status"] == "ok"
+    assert (
+        report_of(empty, place, plane_count=6, azimuths=[math.pi * i / 6 for i in range(6)])["status"] == "ok"
+    )
+
+
 @pytest.mark.parametrize("extent", [0.0, 0.3, 0.8])
 @pytest.mark.parametrize("location", [(0.9, 0.2, 1.0), (0.98, 0.1, 1.0), (0.9, 0.85, 1.0), (0.6, -0.7, 1.0)])
 def test_the_patch_ends_at_the_edges_of_its_face(empty, cube, location, extent):

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether a touch has felt so few facets that its curvature is theirs: on prisms, which are known exactly."""
 
+import itertools
 import math
 
 import numpy as np
@@ -56,10 +57,81 @@ def has_few(prism, extent, x=0.01):
 
 
 @pytest.mark.parametrize(
-    ("facets", "extent", "few"), [(5, 0.15, True), (8, 0.5, True), (9, 0.1, True), (41, 0.4, False)]
+    ("facets", "extent", "few"),
+    [(5, 0.15, True), (8, 0.5, True), (9, 0.1, True), (16, 0.5, False), (41, 0.4, False)],
 )
 def test_few_facets_of_an_arc_are_not_its_shape(facets, extent, few):
     assert has_few(arc(facets), extent) is few
+
+
+class Mesh:
+    """Triangles of a convex mesh around the origin, which a ray meets."""
+
+    def __init__(self, corners):
+        self.corners = np.array(corners)  # (n, 3, 3), counterclockwise from outside
+        a, b, c = self.corners.swapaxes(0, 1)
+        self.normals = np.cross(b - a, c - a)
+        self.normals /= np.linalg.norm(self.normals, axis=1, keepdims=True)
+        self.offs = (self.normals * a).sum(axis=1)
+
+    def ray_cast(self, origin, direction, distance):
+        speeds, gaps = self.normals @ direction, self.offs - self.normals @ origin
+        with np.errstate(divide="ignore", invalid="ignore"):
+            gone = gaps / speeds
+        enters, leaves = gone[speeds < 0.0].max(initial=-np.inf), gone[speeds > 0.0].min(initial=np.inf)
+        at = enters if enters >= 0.0 else leaves
+        if enters > leaves or not 0.0 <= at <= distance:
+            return None
+        face = int(
+            np.argmin(np.abs(np.where(np.sign(speeds) == (-1 if at == enters else 1), gone, np.inf) - at))
+        )
+        return tuple(np.add(origin, at * np.array(direction))), tuple(self.normals[face])
+
+    def face_near(self, point):
+        return int(np.argmax(self.normals @ point - self.offs))
+
+    def corners_of(self, face):
+        return self.corners[face]
+
+
+def icosphere(level):
+    """Blender's ball of triangles, whose corners lie on the unit sphere."""
+    g = 0.5 * (1.0 + math.sqrt(5.0))
+    points = np.array([p for a in (-1.0, 1.0) for b in (-g, g) for p in ((0, a, b), (a, b, 0), (b, 0, a))])
+    faces = [
+        t
+        for t in itertools.combinations(points, 3)
+        if all(abs(math.dist(p, q) - 2.0) < 1e-9 for p, q in itertools.combinations(t, 2))
+    ]
+    faces = [(a, b, c) if np.dot(np.cross(b - a, c - a), a) > 0.0 else (a, c, b) for a, b, c in faces]
+    for _ in range(level - 1):
+        faces = [part for a, b, c in faces for part in split(a, b, c)]
+    return Mesh(np.array(faces) / np.linalg.norm(faces, axis=-1, keepdims=True))
+
+
+def split(a, b, c):
+    a, b, c = (np.divide(p, np.linalg.norm(p)) for p in (a, b, c))
+    d, e, f = a + b, b + c, c + a
+    d, e, f = (p / np.linalg.norm(p) for p in (d, e, f))
+    return (a, d, f), (d, b, e), (f, e, c), (d, e, f)
+
+
+def test_the_curvature_of_a_ball_is_right_or_said_to_be_that_of_facets():
+    """A ball of 320 triangles: more than a dozen of them are felt, and curvatures are off by up to .9."""
+    ball, rng = icosphere(3), np.random.default_rng(0)
+    wrong, called = 0, 0
+    for direction in rng.normal(size=(24, 3)):
+        up = direction / np.linalg.norm(direction)
+        point, normal = ball.ray_cast(tuple(2.0 * up), tuple(-up), 2.0)
+        r = core.explore(ball, point, normal).result
+        off, few = (
+            max(abs(r.k1 + 1.0), abs(r.k2 + 1.0)),
+            core.has_few_facets(r, ball.face_near, ball.corners_of),
+        )
+        wrong += off > 0.6 and not few
+        called += few
+    assert called > 16
+    assert wrong <= 2
 
 
 def test_a_flat_face_between_sharp_edges_is_the_shape():
