@@ -12,8 +12,7 @@ thread, in one Blender without a window: `ray casts` are Blender's part of track
 reconstruction with its report, `mesh write` rewrites patch and contours with normals and colors, and `all` is
 the whole update with Blender's evaluation of what has changed, without the redraw. The extent is given, and
 the last column says how many times as long an update takes that chooses it. Two columns are not live: the
-first touch, which builds that tree, and the end of a gesture, which chooses the step and measures the
-distances to the mesh.
+first touch, which builds that tree, and the end of a gesture, which measures the distances to the mesh.
 """
 
 import argparse

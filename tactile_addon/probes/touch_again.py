@@ -115,7 +115,7 @@ def _left_contours(probe: Object) -> Object | None:
 
 def touch_at(probe: Object, depsgraph: bpy.types.Depsgraph, complete: bool, **more: Any) -> Touched:
     """A touch with the probe's inputs. Raises ValueError, with a sentence, if there can be none."""
-    settings, matrix, record = probe.tactile_probe, probe.matrix_world, record_of(probe)
+    settings, matrix = probe.tactile_probe, probe.matrix_world
     if settings.target is None:
         raise ValueError("the probe has no target: choose the mesh to touch")
     if not _is_there(settings.target, depsgraph):
@@ -127,10 +127,7 @@ def touch_at(probe: Object, depsgraph: bpy.types.Depsgraph, complete: bool, **mo
     if not anchor.can_have_children(probe):
         raise ValueError("the probe has a scale of 0 or beyond all numbers: give it a scale of 1")
     arguments = touch_arguments(settings)
-    if not complete and record is not None:
-        if arguments["extent"]:  # Choosing them anew takes long.
-            kept = {"step": 0.0, "degree": "auto"}.items()
-            arguments |= {name: record.get(name, own) for name, own in kept if arguments[name] == own}
+    if not complete and record_of(probe) is not None:
         arguments["sound"] = not settings.shape.endswith(NO_SHAPE)
     return touch(
         settings.target,

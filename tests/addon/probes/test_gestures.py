@@ -84,6 +84,19 @@ def test_an_extent_that_is_given_stays_while_the_point_is_dragged(empty, ridge, 
     assert "uncertain" in [report["status"] for report in reports]
 
 
+def test_while_the_extent_is_dragged_numbers_are_those_of_its_end(empty, ridge, gesture):
+    probe, patch = pick(empty, ridge, -0.3)
+    for extent in (0.4, 0.25, 0.12, 0.05):
+        probe.tactile_probe.extent = extent
+        empty.context.view_layer.update()
+        dragged = report_of(patch)
+        assert not dragged["is_verified"]
+        gesture(empty, probe)
+        ended = report_of(patch)
+        for name in set(COMMON) - {"status", "message"}:  # the mesh may contradict a patch in the end
+            assert dragged[name] == ended[name], name
+
+
 def test_at_the_end_of_a_gesture_the_patch_is_that_of_a_fresh_touch(empty, ridge, gesture):
     probe, patch = pick(empty, ridge, -0.6)
     slide(empty, probe, patch, np.linspace(-0.5, -0.1, 9))
