@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How patches and whole objects are shown: their colors, and patches that are beside or over each other."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import bpy
@@ -42,7 +42,7 @@ def recolor(obj: Object) -> None:
     shades, record = values(mesh, shown), obj[RECORD if RECORD in obj else ATLAS_RECORD]
     floor = LEAST_RANGE * record["radius"] ** POWERS[shown]
     unknown = _unknown(mesh) if shown in CURVATURES else []
-    if STD_OF.get(shown) in mesh.attributes:
+    if STD_OF.get(shown, "") in mesh.attributes:
         shades = colors.beyond_doubt(shades, values(mesh, STD_OF[shown]))
     curvedness = np.delete(values(mesh, "curvedness"), unknown)
     if shown == "gaussian_curvature" and len(curvedness):
@@ -93,18 +93,38 @@ def _draw_above(patch: Object, others: list[Object]) -> None:
     for obj in (patch, *sorted(higher, key=lambda each: each[LAYER])):
         below = [each for each in (patch, *others) if each.get(LAYER, 0) < obj[LAYER]]
         below = [each for each in below if _overlap(obj[RECORD], each[RECORD])]
-        height = max((_height(each) + _layer(obj, each) for each in below), default=0.0)
+        height = max((_height(each) + _layer(obj, each) for each in below), default=_above_surfaces(obj))
         for part in filter(None, (obj, contours_of(obj))):
             _lift(part, height)
 
 
+def settle_on(surface: Object) -> None:
+    """Draws all patches of its mesh above the surface of a whole object, which is in the same place."""
+    source, objects = surface[ATLAS_RECORD]["source"], [*bpy.data.objects]
+    for patch in (obj for obj in objects if RECORD in obj and obj[RECORD]["source"] == source):
+        if patch.is_editable and is_colored(patch):
+            settle(patch)
+
+
+def _above_surfaces(patch: Object) -> float:
+    """How far above the surfaces of whole objects a patch is drawn; 0 if its mesh has none."""
+    objects: Iterable[Object] = bpy.data.objects
+    source = patch[RECORD]["source"]
+    surfaces = (obj for obj in objects if ATLAS_RECORD in obj and obj[ATLAS_RECORD]["source"] == source)
+    return max((_apart(patch[RECORD], obj[ATLAS_RECORD]) for obj in surfaces), default=0.0)
+
+
+def _apart(upper: Mapping[str, Any], lower: Mapping[str, Any]) -> float:
+    """By how much more than both of two reports may be off the upper one is drawn higher."""
+    apart, radius = APART * (upper["height_std"] + lower["height_std"]), upper["radius"]
+    return float(min(max(apart, LEAST_LAYER * radius), MOST_LAYER * radius))
+
+
 def _layer(upper: Object, lower: Object) -> float:
     """How far above another a patch is drawn: by more than both may be off, as two in one place flicker."""
-    radius = upper[RECORD]["radius"]
-    apart = APART * (upper[RECORD]["height_std"] + lower[RECORD]["height_std"])
     # Eevee draws each of them above the mesh as well, the lower one perhaps by more.
     further = max(lower.get(ABOVE, 0.0) - upper.get(ABOVE, 0.0), 0.0)
-    return min(max(apart, LEAST_LAYER * radius), MOST_LAYER * radius) + further
+    return _apart(upper[RECORD], lower[RECORD]) + further
 
 
 def _height(patch: Object) -> float:

@@ -96,7 +96,7 @@ def _surface(record: Mapping[str, Any]) -> str:
         return "closed all round"
     if record.get("uncovered"):
         return f"open, with {many(record['uncovered'], 'place', 'places')} to go on from"
-    return "open where nothing was felt"
+    return "open where the object ends" if record["status"] == "ok" else "open where nothing was felt"
 
 
 def _edge(record: Mapping[str, Any]) -> str | None:

@@ -15,7 +15,7 @@ from ... import core
 from ..scene import colors, patch_object, patch_record, undo
 from ..scene.attributes import COLOR, DEVIATION, HEIGHT_STD, NODE
 from ..scene.mesh_data import ABOVE, emission, fill, own_mesh
-from ..scene.shown import recolor
+from ..scene.shown import recolor, settle_on
 from ..scene.viewports import show_colors, show_size
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Array, Object
@@ -126,3 +126,4 @@ def rewrite(obj: Object, whole: WholeSurface, report: dict[str, Any]) -> None:
     obj[patch_record.GRAPH] = whole.graph
     obj[ABOVE] = DRAWN_ABOVE * float(np.ptp(found.vertices, axis=0).max())
     recolor(obj)
+    settle_on(obj)
