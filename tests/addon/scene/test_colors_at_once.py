@@ -115,7 +115,14 @@ def test_what_may_be_error_of_the_curvature_is_pale(empty):
     assert np.abs(shades - green).max() < 0.35  # deep red and blue are .7 and .75 off
     patch.tactile_colors = "mean_curvature"
     shades = values(patch.data, "curvature_color", "color", 4)
-    assert np.median(np.abs(shades - green).max(axis=1)) > 0.5  # H is -1/2, for sure
+    assert np.abs(shades - green).max(axis=1).min() > 0.5  # H is -1/2, for sure
+
+
+def test_a_ball_has_one_color_all_over_a_patch(empty, ball):
+    patch = touch(empty, (0.6, -0.6, 0.53), extent=0.0)
+    assert np.ptp(values(patch.data, "gaussian_curvature")) > 0.3
+    shades = values(patch.data, "curvature_color", "color", 4)
+    assert np.ptp(shades, axis=0).max() < 0.4  # deep red and pale green are .95 apart
 
 
 def test_eevee_draws_a_patch_above_the_mesh_where_it_is_below_it(empty):
