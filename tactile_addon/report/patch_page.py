@@ -13,10 +13,11 @@ from ..scene import patch_record
 from ..scene.attributes import DEVIATION, POSITION
 from ..scene.colors import shades, symmetric_range
 from ..scene.mesh_data import values
+from ..scene.shown import as_shown
 from ..touch import units
 from ..touch.types import Array, Object
 from ..touch.units import Unit
-from ..touch.wording import readable_rows
+from ..touch.wording import readable_rows, verdict
 from . import drawing, page, parts
 
 SHOWN = (
@@ -42,7 +43,7 @@ def patch_page(patch: Object, r: core.Reconstruction) -> str:
     reaches = parts.shares_of(r.radius, "radius")
     bands = parts.bands(off.lengths, off.weights, r.mean_height_std, unit, reaches)
     sections = [
-        page.verdict(f"{record['status']}: {record['message']}", record["status"] == "ok"),
+        page.verdict(f"{verdict(record, unit)}. {record['message']}", record["status"] == "ok"),
         page.section("Pictures", *_pictures(patch, r, record, unit)),
         page.section("Deviations", parts.spread(off.lengths, off.weights, unit, off.words)),
         page.section("Tolerance bands", bands),
@@ -55,11 +56,11 @@ def _pictures(patch: Object, r: core.Reconstruction, record: Mapping[str, Any], 
     points, corners = values(patch.data, POSITION).astype(float), parts.corners(patch.data)
     contacts = r.contacts[:, :2] * record["radius"] / r.radius  # The object's mesh has this scale.
     for attribute, title, power in SHOWN if _has_mesh(record) else SHOWN[:-1]:
-        shown = values(patch.data, attribute)
+        shown, low = as_shown(patch.data, attribute), 0.0 if attribute in patch_record.POSITIVE else -1.0
         limit = symmetric_range(shown, parts.LEAST_RANGE)
         colors = shades(shown[corners].mean(axis=1), limit)
         picture = drawing.triangles(points[:, :2], corners, colors, contacts)
-        scale = drawing.scale(limit, parts.label(power, unit))
+        scale = drawing.scale(limit, parts.label(power, unit), low)
         yield page.figure(f"{picture}<br>{scale}", f"{title}, along the normal, with the contacts")
 
 

@@ -189,3 +189,12 @@ def test_an_edited_whole_object_or_map_gets_one_too(empty, ball, tmp_path, kind,
     with pytest.raises(RuntimeError, match="is no longer a complete surface: touch all over again"):
         empty.ops.tactile.export_report(filepath=str(tmp_path / "object.html"))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_page_says_what_the_panel_says_and_its_scales_begin_where_values_do(empty, ball, tmp_path):
+    empty.ops.tactile.pick(target=ball.name, location=TOUCH["location"], new=True)
+    empty.ops.tactile.export_report(filepath=str(tmp_path / "page.html"))
+    text = (tmp_path / "page.html").read_text()
+    assert "Good: heights to ±" in text
+    ends = re.findall(r'<text x="0" y="27" text-anchor="start">([^<]+)<', text)
+    assert [end.startswith("-") for end in ends[:3]] == [True, False, True]
