@@ -48,12 +48,11 @@ def expected_count(obj: Object, depsgraph: bpy.types.Depsgraph, extent: float, s
     extent = extent or EXTENT_SHARE * size_of(evaluated, linear)
     area = float(read_array(evaluated.data.polygons, "area").sum())
     area *= abs(np.linalg.det(linear)) ** (2.0 / 3.0)
-    triangles = len(evaluated.data.loops) - 2 * len(evaluated.data.polygons)
-    return min(triangles, core.spaced_count(area, spacing or SPACING_SHARE * extent))
+    return min(len(evaluated.data.polygons), core.spaced_count(area, spacing or SPACING_SHARE * extent))
 
 
 class StabilityMap:
-    """Touches of an evaluated mesh in the middle of triangles that are spaced evenly.
+    """Touches of an evaluated mesh in the middle of faces that are spaced evenly.
 
     At its vertices a coarse mesh has creases, and most clicks are elsewhere.
 
@@ -103,7 +102,7 @@ class StabilityMap:
 
     def steps(self) -> Iterator[None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
-        middles = self.surface.points[self.surface.triangles].mean(axis=1)
+        middles = _middles(self.surface)
         yield
         for index in core.spaced(middles, self.spacing, self._rng):
             if index is not None:
@@ -210,6 +209,16 @@ def _reason_of(stops: Iterable[str]) -> int:
     """The code of the most frequent stop. Curves that go on, but have no tangent plane, are on a crease."""
     counts = Counter(stop for stop in stops if stop in STOP_CODES)
     return STOP_CODES[counts.most_common(1)[0][0] if counts else core.CREASE]
+
+
+def _middles(surface: DetachedMesh) -> Array:
+    """The middle of the largest triangle of each face, (m, 3), which is within it even if it is concave."""
+    corners = surface.points[surface.triangles]
+    a, b, c = corners.swapaxes(0, 1)
+    order = np.lexsort((np.linalg.norm(np.cross(b - a, c - a), axis=1), surface.owners))
+    largest = order[np.diff(surface.owners[order], append=-1) != 0]
+    found: Array = corners[largest].mean(axis=1)
+    return found
 
 
 class _Plane:

@@ -26,7 +26,7 @@ class DetachedMesh(PlacedMesh):
     name, matrix : name and transform of the object
     points : (n, 3), of the vertices; has_face : (n,), whether they belong to a face
     faces : (m, 3), the first three vertices of each face
-    triangles : (k, 3), all faces in triangles, counterclockwise from outside
+    triangles : (k, 3), all faces in triangles, counterclockwise from outside; owners : (k,), their faces
     size : the longest edge of the box around all faces, in the world
     spacing : the largest distance of neighboring float32 numbers in the mesh
     """
@@ -48,6 +48,7 @@ class DetachedMesh(PlacedMesh):
         corners = read_array(mesh.loops, "vertex_index", dtype=np.int32)
         starts = read_array(mesh.polygons, "loop_start", dtype=np.int32)
         self.triangles = read_array(mesh.loop_triangles, "vertices", 3, np.int32)
+        self.owners = read_array(mesh.loop_triangles, "polygon_index", dtype=np.int32)
         self.faces = corners[starts[:, None] + np.arange(3)]
         self._corners, self._starts = corners, np.append(starts, len(corners))
         if np.linalg.det(linear) < 0.0:

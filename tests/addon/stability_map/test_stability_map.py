@@ -102,11 +102,12 @@ def add_head(bpy):
     [
         (lambda bpy: bpy.ops.mesh.primitive_cube_add(), 1.0),
         (lambda bpy: bpy.ops.mesh.primitive_plane_add(), 1.0),
-        (lambda bpy: bpy.ops.mesh.primitive_cylinder_add(), 0.8),
+        (lambda bpy: bpy.ops.mesh.primitive_cylinder_add(), 1.0),
+        (lambda bpy: bpy.ops.mesh.primitive_cone_add(), 0.9),
         (lambda bpy: bpy.ops.mesh.primitive_uv_sphere_add(), 0.8),
         (add_head, 0.5),
     ],
-    ids=["cube", "plane", "cylinder", "ball", "head"],
+    ids=["cube", "plane", "cylinder", "cone", "ball", "head"],
 )
 def test_what_a_map_calls_a_patch_a_probe_on_it_finds(empty, touched, add, least):
     """A map has patches where most clicks have, though there are creases at each vertex of these."""
@@ -170,10 +171,11 @@ def test_a_map_with_an_automatic_extent_says_so(empty, ridge, extension):
 def test_a_cube_has_patches_on_its_faces_and_none_at_its_edges(empty, touched):
     empty.ops.mesh.primitive_cube_add(size=2.0)
     edited(empty, number_cuts=9)
-    found = touched(empty.context.object, spacing=0.01, extent=0.8)
-    assert len(found.places) == 2 * len(found.surface.faces)
+    found = touched(empty.context.object, spacing=0.01, extent=0.8, step=0.1)
+    assert len(found.places) == len(found.surface.faces)
     to_edge = 1.0 - np.sort(np.abs(found.places), axis=1)[:, 1]
-    assert np.all(found.reason[to_edge < 0.065] == CREASE)  # a step is as long as a third of a facet
+    assert np.all(found.reason[to_edge < 0.07] == CREASE)  # their first steps cross the edge
+    assert np.any(to_edge < 0.07)
     assert np.all(found.reason[to_edge > 0.13] == PATCH)
     assert found.measures["error"][to_edge > 0.13].max() < 1e-5
     assert found.report()["refused"]["crease"] == np.count_nonzero(found.reason == CREASE)
