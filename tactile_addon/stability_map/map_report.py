@@ -9,8 +9,11 @@ import bpy
 
 from ..touch import units
 from ..touch.units import Unit
+from ..touch.wording import many
 from . import map_object
 from .stability import REASONS
+
+ZERO = 1e-6  # A median below this share of the spacing counts as 0.
 
 
 def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -31,7 +34,8 @@ def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def map_summary(record: Mapping[str, Any]) -> str:
     """A sentence on what a stability map has found."""
-    words = [f"{record['patches']} patches at {record['touched']} points, {record['in_doubt']} in doubt"]
+    patches = many(record["patches"], "patch", "patches")
+    words = [f"{patches} at {many(record['touched'], 'point', 'points')}, {record['in_doubt']} in doubt"]
     names = {key: name for key, name, _ in REASONS}
     words += [f"{count} refused: {names[key]}" for key, count in record["refused"].items() if count]
     return "; ".join(words)
@@ -60,4 +64,10 @@ def _medians(record: Mapping[str, Any], unit: Unit) -> Iterator[tuple[str, str, 
     """(attribute, title, value) of each median that is known."""
     for name, title, _, power in map_object.MAP_QUANTITIES:
         if f"{name}_median" in record:
-            yield name, title, units.say(record[f"{name}_median"], power, unit)
+            found = record[f"{name}_median"]
+            # In single precision a little is left of 0.
+            yield (
+                name,
+                title,
+                units.say(found if found > ZERO * record["spacing"] ** power else 0.0, power, unit),
+            )

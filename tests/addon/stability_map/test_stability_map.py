@@ -501,6 +501,14 @@ def test_a_probe_finds_the_place_that_a_map_touched(empty, vase, extension):
     assert touched_near(painted, (50.0, 0.0, 0.0)) == (50.0, 0.0, 0.0)
 
 
+def test_a_map_of_a_plane_is_one_patch_without_error(empty, extension):
+    empty.ops.mesh.primitive_plane_add()
+    _, record = stability_map(empty)
+    report = extension.tactile_addon.stability_map.map_report
+    assert report.map_summary(record) == "1 patch at 1 point, 0 in doubt"
+    assert dict(report.map_table_rows(record))["median error"] == "0 cm"
+
+
 def test_a_map_of_few_facets_is_in_doubt(empty):
     empty.ops.mesh.primitive_torus_add()
     _, record = stability_map(empty, spacing=0.5)
