@@ -10,7 +10,7 @@ from typing import Any, TypedDict
 import numpy as np
 
 from ... import core
-from .types import Array
+from .types import Array, Point
 
 # The surface itself ends a curve in these ways.
 SURFACE_STOPS = (core.CREASE, core.NO_CONTACT, core.NOT_MONGE)
@@ -132,7 +132,7 @@ def ends(contours: Sequence[core.Contour], has_extent: bool) -> str:
     return f" {', '.join(words)}{', before the extent' if has_extent else ''}."
 
 
-def stops_at(contours: Sequence[core.Contour], point: Array, reach: float = 0.0) -> list[str]:
+def stops_at(contours: Sequence[core.Contour], point: Point | Array, reach: float = 0.0) -> list[str]:
     """Why half curves end at the point already, within `reach`; it is then on a crease or an edge."""
     return [
         stop
