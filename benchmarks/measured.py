@@ -190,15 +190,16 @@ def judged(thing, seed, is_full):
     distance, std = atlas.distance(places)
     finite = np.isfinite(std)
     wrong = finite & (np.signbit(distance) != np.signbit(truth))
+    sure = wrong & (np.abs(truth) > SURE * np.where(finite, std, 0.0))
     mesh = atlas.reference.mesh
     return {
         "seed": seed,
         "kind": kind,
         "ok": atlas.status == "ok",
         "closed": mesh.is_closed,
-        "finite": int(finite.sum()),
-        "wrong": int(wrong.sum()),
-        "sure wrong": int((wrong & (np.abs(truth) > SURE * np.where(finite, std, 0.0))).sum()),
+        "finite": int(finite[: len(around)].sum()),
+        "wrong": int(wrong[: len(around)].sum()),
+        "sure wrong": int(sure[: len(around)].sum()),
         "felt above": float(finite[len(around) :].mean()),
         "within": float(np.mean(np.abs(distance - truth)[finite] <= 1.645 * std[finite])),
         "contacts": len(points),

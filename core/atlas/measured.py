@@ -197,12 +197,13 @@ class _Cloud(NamedTuple):
         wall = connected_components(self.links[near][:, near], directed=False)[1]
         return near[wall == wall[np.flatnonzero(near == i)]]
 
-    def patch(self, i: int, radius: float) -> Reconstruction | None:
-        """The patch of those contacts around contact i that face the same way, or None if they carry none."""
-        points, normals = self.contacts.points, self.contacts.normals
-        strokes, place, outward = [[points[self.same_sheet(i, radius)]]], points[i][None], normals[i][None]
-        (r,) = reconstruct_many(place, [()], outward=outward, strokes_list=strokes, noise=self.noise)
-        return r if isinstance(r, Reconstruction) else None
+    def patches(self, places: Sequence[int], radius: float) -> list[Reconstruction | None]:
+        """The patch of those contacts around each of some that are of its wall; None where they carry none."""
+        points, normals = self.contacts.points[places], self.contacts.normals[places]
+        strokes = [[self.contacts.points[self.same_sheet(i, radius)]] for i in places]
+        none: list[list[Contour]] = [[] for _ in places]
+        found = reconstruct_many(points, none, outward=normals, strokes_list=strokes, noise=self.noise)
+        return [r if isinstance(r, Reconstruction) else None for r in found]
 
     def rim(self, i: int, r: Reconstruction) -> Array:
         """The radii (AZIMUTHS,) of a patch, in unit radius, as far as it has contacts beside it.
@@ -224,19 +225,33 @@ class _Cloud(NamedTuple):
         ended = np.where(empty.any(axis=0), empty.argmax(axis=0), RAY_PLACES)
         return domain * np.maximum(ended, 1) / RAY_PLACES
 
-    def largest_patch(self, i: int, radius: float) -> Reconstruction | None:
-        """The largest patch around contact i that is certain enough, or the smallest, or None."""
-        best = None
-        for _ in range(WIDENINGS):
-            r = self.patch(i, radius)
-            if r is None:
+    def certain_patch(self, i: int, radius: float) -> Reconstruction | None:
+        """The patch around contact i, or None if there is none, or it is uncertain or off its contacts."""
+        (r,) = self.patches([i], radius)
+        if r is None:
+            return None
+        most = self.largest or GROWN * r.radius
+        off = r.typical_miss > MISSED * max(self.noise, most)
+        return None if off or r.mean_height_std > most else r
+
+    def largest_patch(self, i: int, radii: Array, last: int) -> tuple[Reconstruction | None, int]:
+        """The largest certain patch around contact i, or the smallest one, or None; which of the radii it has.
+
+        last : which of them the last patch had, for those of neighbors are of about one size
+        """
+        (smallest,) = self.patches([i], radii[0])
+        if smallest is None:
+            return None, last
+        found = self.certain_patch(i, radii[last])
+        if found is None:
+            smaller = ((self.certain_patch(i, radii[k]), k) for k in range(last - 1, 0, -1))
+            return next(((r, k) for r, k in smaller if r is not None), (smallest, 0))
+        for k in range(last + 1, len(radii)):
+            larger = self.certain_patch(i, radii[k])
+            if larger is None:
                 break
-            most = self.largest or GROWN * r.radius
-            off = r.typical_miss > MISSED * max(self.noise, most)
-            if best is not None and (off or r.mean_height_std > most):
-                break
-            best, radius = r, WIDENING * radius
-        return best
+            found, last = larger, k
+        return found, last
 
     def least_radius(self) -> Generator[float, None, float]:
         """The least radius at which patches exist at half of some places, for contacts may lie in lines.
@@ -248,7 +263,7 @@ class _Cloud(NamedTuple):
         radius = float(np.median(self.tree.query(points[some], FEWEST)[0][:, -1]))
         self._require_fine(radius)
         for _ in range(WIDENINGS):
-            if sum(self.patch(i, radius) is not None for i in some.tolist()) * 2 >= SOME_PLACES:
+            if sum(r is not None for r in self.patches(some.tolist(), radius)) * 2 >= SOME_PLACES:
                 return radius
             radius *= WIDENING
             yield 0.0
@@ -279,12 +294,12 @@ def _patches(cloud: _Cloud) -> Generator[float, None, tuple[list[Reconstruction]
     Yields the share that is covered.
     """
     radius = yield from cloud.least_radius()
-    points = cloud.contacts.points
+    points, radii, last = cloud.contacts.points, radius * WIDENING ** np.arange(WIDENINGS), 0
     left, found, tables = np.ones(len(points), dtype=bool), [], []
     for i in range(len(left)):
         if not left[i]:
             continue
-        r = cloud.largest_patch(i, radius)
+        r, last = cloud.largest_patch(i, radii, last)
         some = cloud.same_sheet(i, MISSING * radius)
         left[some] = False
         if r is not None:
