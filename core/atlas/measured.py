@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import SMALLEST, Array, list_of, number, unit_vector, unit_vectors
-from ..contours.contour import Contour
+from ..contours.contour import Contour, equal_points
 from ..reconstruction.from_contours import reconstruct_many
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.start import TOUCH_ROUNDING, too_coarse
@@ -38,6 +38,9 @@ OFF = 0.03  # and not more than this share may be off or face the other way.
 ABREAST = 8  # So many neighbors of each contact are to face the same way.
 SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
 OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
+# Neighbors below centers lie the other way by this share, for this share of a center's links. Along edges that
+# is so by chance, at up to a ninth of all centers, and for a ball that is too large at this share of them.
+TURNED = 0.25
 GROWN = 0.012  # Without a tolerance, patches grow up to this mean deviation, as a share of the radius.
 
 
@@ -108,7 +111,8 @@ def _contacts(
     normals[~known] = sharpened(points, normals, planes)[~known]
     balls = np.repeat([stroke.ball or 0.0 for stroke in strokes], [len(some) for some in own])
     if balls.any():
-        points = points - balls[:, None] * normals
+        centers, points = points, points - balls[:, None] * normals
+        doubt = doubt or _beyond_bend(centers, points, planes.links)
         planes = planes_of(points, noise)
     return MeasuredContacts(points, normals, planes.reach, planes.links), noise, doubt
 
@@ -119,7 +123,7 @@ def _strokes(given: Sequence[ArrayLike | Contour], noise: float | None) -> tuple
         stroke if isinstance(stroke, Contour) else Contour(stroke)  # type: ignore[arg-type]
         for stroke in list_of("contours_or_strokes", given, object)  # type: ignore[arg-type]
     ]
-    points = np.vstack([np.empty((0, 3)), *(stroke.points for stroke in strokes)])
+    strokes, points = _each_once(strokes)
     if len(points) < FEWEST:
         raise ValueError(f"contours_or_strokes: expected {FEWEST} contacts or more, got {len(points)}")
     size = float(np.ptp(points, axis=0).max())
@@ -130,6 +134,20 @@ def _strokes(given: Sequence[ArrayLike | Contour], noise: float | None) -> tuple
     if noise > size:
         raise ValueError(f"noise: expected less than the size of what was felt, {size:.3g}, got {noise:.3g}")
     return strokes, points, noise
+
+
+def _each_once(strokes: list[Contour]) -> tuple[list[Contour], Array]:
+    """The strokes without contacts that earlier ones have, too, which tell no more; all contacts (n, 3)."""
+    points = np.vstack([np.empty((0, 3)), *(stroke.points for stroke in strokes)])
+    order, starts = equal_points(points)
+    is_first = np.zeros(len(points), dtype=bool)
+    is_first[order[starts]] = True
+    found, ends = [], np.cumsum([len(stroke.points) for stroke in strokes])
+    for stroke, end in zip(strokes, ends.tolist(), strict=True):
+        which = is_first[end - len(stroke.points) : end]
+        normals = None if stroke.normals is None else stroke.normals[which]
+        found.append(stroke if which.all() else replace(stroke, points=stroke.points[which], normals=normals))
+    return found, points[is_first]
 
 
 def _require_one_side(points: Array, normals: Array) -> None:
@@ -152,6 +170,22 @@ def _require_one_side(points: Array, normals: Array) -> None:
             "normals: expected those of neighboring contacts on one side, got opposite ones at "
             f"{np.count_nonzero(wrong.any(axis=1))} of {len(wrong)} contacts: turn all outward"
         )
+
+
+def _beyond_bend(centers: Array, contacts: Array, links: NDArray[np.intp]) -> tuple[str, str] | None:
+    """The status and a sentence, if a ball is larger than the bends of its centers (n, 3) at many of them.
+
+    There kappa_center < -1 / r, and contacts (n, 3) lie the other way around than their centers.
+    """
+    ways, below = (points[links] - points[:, None] for points in (centers, contacts))
+    turned = np.einsum("nki,nki->nk", ways, below) < -TURNED * np.einsum("nki,nki->nk", ways, ways)
+    beyond = turned.mean(axis=1) > TURNED
+    if beyond.mean() <= TURNED:
+        return None
+    return "uncertain", (
+        f"Centers around {place_text(centers[beyond])} bend more than a ball of this radius can: give the "
+        "radius of the ball, or use a smaller one."
+    )
 
 
 def _off_contacts(atlas: Atlas, contacts: MeasuredContacts, noise: float) -> tuple[str, str] | None:
