@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measured objects: whether `core.atlas_of` is honest beyond what was felt, and orients strokes by itself.
 
-`python -m benchmarks.measured [--partial N] [--full N] [--first SEED] [--only NAME]`, from the root of a
+`python -m benchmarks.measured [--partial N] [--full N] [--first SEED] [--only NAME] [...]`, from the root of a
 checkout, scans closed objects of size 1 with strokes that have a noise of .0005: curves in two families of
 parallel planes, seeded. It prints Markdown tables:
 
@@ -12,7 +12,9 @@ parallel planes, seeded. It prints Markdown tables:
     five deviations; how many of those up to a tenth of the size above felt area are finite; and how often
     distances are within the 90 % interval. Every second scan has normals, the others have to be oriented;
 (b) with `--orientation`, every object of benchmarks.atlas_shapes, with gaps between strokes below half its
-    thinnest wall: the share of contacts whose normals face outward.
+    thinnest wall, and 1.8 times as long: the share of contacts whose normals face outward, and the doubt. Of
+    longer gaps it is that of the whole object if many normals are wrong without one of their own;
+(c) with `--touches N`, the time of `core.atlas_of` for N touches of an ellipsoid, of three curves each.
 """
 
 import argparse
@@ -44,6 +46,11 @@ NOISE = 0.0005
 PLACES = 1000  # This many places are judged around each scan, and as many above felt area.
 ABOVE = 0.1  # These are at most so far above it.
 SURE = 5.0
+CLOSE, COARSE = 0.95, 1.8  # Strokes are so many half walls apart.
+# benchmarks.atlas touches it, too, where its thinnest walls are not resolved.
+WALLS = {"cad_block": 0.0064}
+RIGHT, FEWEST, MOST = 0.99, 100, 200_000  # Of so many contacts, fewer right normals ask for a doubt.
+HALF_AXES, TOLERANCE = np.array([0.5, 0.375, 0.266]), 0.005  # of the ellipsoid, the pebble of examples/robot.py
 GAP = 0.01  # Two balls are ten times as far from each other.
 GAPS = (0.03, 0.06)  # The strokes of a scan are so far apart, at least and at most.
 FINE = 0.5  # Contacts along a stroke are this share of the gap apart.
@@ -61,6 +68,21 @@ OBJECTS = {
     "T": lambda: tee(0.3, 0.7, 1, 0.3, 0.4),
     "hollow ball": lambda: hollow_ball(0.6),
 }
+
+
+class Ellipsoid:
+    """Answers rays."""
+
+    def ray_cast(self, origin, direction, distance):
+        o, d = np.asarray(origin) / HALF_AXES, np.asarray(direction) / HALF_AXES
+        a, b = d @ d, o @ d
+        root = np.sqrt(max(b * b - a * (o @ o - 1.0), 0.0))
+        for length in ((-b - root) / a, (-b + root) / a):
+            if root and 0.0 <= length <= distance:
+                point = (o + length * d) * HALF_AXES
+                normal = point / HALF_AXES**2
+                return point, normal / np.linalg.norm(normal)
+        return None
 
 
 def rotation(rng):
@@ -249,35 +271,68 @@ def print_scans(only, seeds, is_full):
     table(head, rows)
 
 
-def print_orientation(only):
+def oriented_strokes(thing, gap):
+    """Strokes so far apart: contacts, the share whose normals face outward, the doubt of these, seconds."""
+    rng = np.random.default_rng(0)
+    strokes = strokes_of(thing, gap, rng)
+    normals = np.vstack([n for _, n in strokes])
+    felt = [p + rng.normal(0.0, NOISE, p.shape) for p, _ in strokes]
+    start = process_time()
+    planes = planes_of(np.vstack(felt), NOISE)
+    try:
+        found = oriented(felt, planes)
+    except ValueError as error:
+        return felt, np.nan, ("refused", str(error)), process_time() - start
+    doubt = doubt_of(np.vstack(felt), found, planes)
+    seconds = process_time() - start
+    return felt, np.mean(np.einsum("ni,ni->n", found, normals) > 0.0), doubt, seconds
+
+
+def print_orientation(only, is_coarse):
     rows = []
     for name, (wall, make) in objects(GAP).items():
         if only not in name:
             continue
         with blender.quiet():
             thing = Made(name, *make())
-        rng = np.random.default_rng(0)
-        strokes = strokes_of(thing, 0.95 * 0.5 * wall, rng)
-        points, normals = (np.vstack(values) for values in zip(*strokes, strict=True))
-        felt = [p + rng.normal(0.0, NOISE, p.shape) for p, _ in strokes]
-        start = process_time()
-        planes = planes_of(np.vstack(felt), NOISE)
-        found = oriented(felt, planes)
-        doubt = doubt_of(np.vstack(felt), found, planes)
-        seconds = process_time() - start
-        right = np.einsum("ni,ni->n", found, normals) > 0.0
+        wall = WALLS.get(name, wall)
+        gap = (COARSE if is_coarse else CLOSE) * 0.5 * wall
+        felt, right, doubt, seconds = oriented_strokes(thing, gap)
+        count = sum(map(len, felt))
+        if is_coarse and doubt is None and right < RIGHT and FEWEST <= count <= MOST:
+            atlas = core.atlas_of(felt, noise=NOISE)
+            doubt = atlas.status, atlas.message
         rows.append(
-            [
-                name,
-                f"{wall:g}",
-                str(len(points)),
-                f"{100 * right.mean():.2f}",
-                (doubt or ("", ""))[1],
-                f"{seconds:.1f}",
-            ]
+            [name, f"{wall:g}", str(count), f"{100 * right:.2f}", " ".join(doubt or ()), f"{seconds:.1f}"]
         )
         print(rows[-1], file=sys.stderr, flush=True)
-    table(["object", "wall", "contacts", "% outward", "doubt", "s"], rows)
+    gaps = f"gaps of {COARSE if is_coarse else CLOSE:g} half walls"
+    table([gaps, "wall", "contacts", "% outward", "doubt", "s"], rows)
+
+
+def print_touches(count):
+    """The time of an atlas of so many touches, of three curves each, of an ellipsoid."""
+    solid = Ellipsoid()
+    k = np.arange(count) + 0.5
+    across, turn = np.arccos(1.0 - 2.0 * k / count), np.pi * (1.0 + np.sqrt(5.0)) * k
+    ways = np.stack([np.cos(turn) * np.sin(across), np.sin(turn) * np.sin(across), np.cos(across)], axis=1)
+    planes = [core.SamplingPlane(a) for a in np.radians([0.0, 60.0, 120.0])]
+    rng, contours = np.random.default_rng(0), []
+    for way in ways:
+        point = way * HALF_AXES
+        options = {"extent": 0.1, "step": 0.1 / 12, "noise": NOISE, "rng": rng}
+        found = core.track(solid, point, point / HALF_AXES**2, planes, **options)
+        contours += [core.Contour(c.points, noise=NOISE) for c in found]
+    seconds = []
+    for _ in range(4):  # The first one imports what is needed.
+        start = process_time()
+        atlas = core.atlas_of(contours, tolerance=TOLERANCE)
+        seconds.append(process_time() - start)
+    table(
+        ["touches", "contacts", "patches", "status", "s"],
+        [[str(count), str(sum(len(c.points) for c in contours)), str(len(atlas.patches)), atlas.status,
+          f"{np.median(seconds[1:]):.2f}"]],
+    )  # fmt: skip
 
 
 def main():
@@ -287,12 +342,16 @@ def main():
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--only", default="")
     parser.add_argument("--orientation", action="store_true")
+    parser.add_argument("--touches", type=int, default=0)
     options = parser.parse_args()
     for count, is_full in ((options.partial, False), (options.full, True)):
         if count:
             print_scans(options.only, range(options.first, options.first + count), is_full)
     if options.orientation:
-        print_orientation(options.only)
+        for is_coarse in (False, True):
+            print_orientation(options.only, is_coarse)
+    if options.touches:
+        print_touches(options.touches)
     print(f"{machine('bpy', 'numpy', 'scipy')}.")
 
 
