@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measured objects: whether `core.atlas_of` is honest beyond what was felt, and orients strokes by itself.
 
-`python -m benchmarks.measured [--partial N] [--full N] [--first SEED] [--only NAME] [...]`, from the root of a
-checkout, scans closed objects of size 1 with strokes that have a noise of .0005: curves in two families of
+`python -m benchmarks.measured [--partial N] [--full N] [--first SEED] [--only NAME] [...]`, from the root of
+a checkout, scans closed objects of size 1 with strokes that have a noise of .0005: curves in two families of
 parallel planes, seeded. It prints Markdown tables:
 
 (a) N partial scans, of which a half space, all but a cap, or all but three curves are missing, and N full
@@ -14,11 +14,18 @@ parallel planes, seeded. It prints Markdown tables:
 (b) with `--orientation`, every object of benchmarks.atlas_shapes, with gaps between strokes below half its
     thinnest wall, and 1.8 times as long: the share of contacts whose normals face outward, and the doubt. Of
     longer gaps it is that of the whole object if many normals are wrong without one of their own;
-(c) with `--touches N`, the time of `core.atlas_of` for N touches of an ellipsoid, of three curves each.
+(c) with `--touches N`, the time of `core.atlas_of` for N touches of the pebble of examples/robot.py, of three
+    curves each;
+(d) with `--robot N`, the touches of examples/robot.py with N seeds, and those of `explore_object`.
 """
 
 import argparse
+import contextlib
+import importlib.util
+import io
 import sys
+import tempfile
+from pathlib import Path
 from time import process_time
 
 import numpy as np
@@ -50,7 +57,10 @@ CLOSE, COARSE = 0.95, 1.8  # Strokes are so many half walls apart.
 # benchmarks.atlas touches it, too, where its thinnest walls are not resolved.
 WALLS = {"cad_block": 0.0064}
 RIGHT, FEWEST, MOST = 0.99, 100, 200_000  # Of so many contacts, fewer right normals ask for a doubt.
-HALF_AXES, TOLERANCE = np.array([0.5, 0.375, 0.266]), 0.005  # of the ellipsoid, the pebble of examples/robot.py
+TOLERANCE, EXTENT = (
+    0.3,
+    6.0,
+)  # Of the pebble of examples/robot.py, in mm, and the length of a half curve there.
 GAP = 0.01  # Two balls are ten times as far from each other.
 GAPS = (0.03, 0.06)  # The strokes of a scan are so far apart, at least and at most.
 FINE = 0.5  # Contacts along a stroke are this share of the gap apart.
@@ -68,21 +78,6 @@ OBJECTS = {
     "T": lambda: tee(0.3, 0.7, 1, 0.3, 0.4),
     "hollow ball": lambda: hollow_ball(0.6),
 }
-
-
-class Ellipsoid:
-    """Answers rays."""
-
-    def ray_cast(self, origin, direction, distance):
-        o, d = np.asarray(origin) / HALF_AXES, np.asarray(direction) / HALF_AXES
-        a, b = d @ d, o @ d
-        root = np.sqrt(max(b * b - a * (o @ o - 1.0), 0.0))
-        for length in ((-b - root) / a, (-b + root) / a):
-            if root and 0.0 <= length <= distance:
-                point = (o + length * d) * HALF_AXES
-                normal = point / HALF_AXES**2
-                return point, normal / np.linalg.norm(normal)
-        return None
 
 
 def rotation(rng):
@@ -310,29 +305,56 @@ def print_orientation(only, is_coarse):
     table([gaps, "wall", "contacts", "% outward", "doubt", "s"], rows)
 
 
+def example():
+    """The module of examples/robot.py, which knows the core by the name that pip gives it."""
+    sys.modules.setdefault("tactile_core", core)
+    spec = importlib.util.spec_from_file_location("robot", Path("examples") / "robot.py")
+    found = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(found)
+    return found
+
+
 def print_touches(count):
-    """The time of an atlas of so many touches, of three curves each, of an ellipsoid."""
-    solid = Ellipsoid()
-    k = np.arange(count) + 0.5
+    """The time of an atlas of so many touches of the pebble, of three curves each."""
+    robot, k = example(), np.arange(count) + 0.5
     across, turn = np.arccos(1.0 - 2.0 * k / count), np.pi * (1.0 + np.sqrt(5.0)) * k
     ways = np.stack([np.cos(turn) * np.sin(across), np.sin(turn) * np.sin(across), np.cos(across)], axis=1)
     planes = [core.SamplingPlane(a) for a in np.radians([0.0, 60.0, 120.0])]
-    rng, contours = np.random.default_rng(0), []
-    for way in ways:
-        point = way * HALF_AXES
-        options = {"extent": 0.1, "step": 0.1 / 12, "noise": NOISE, "rng": rng}
-        found = core.track(solid, point, point / HALF_AXES**2, planes, **options)
-        contours += [core.Contour(c.points, noise=NOISE) for c in found]
+    options = {"extent": EXTENT, "step": EXTENT / 12, "noise": robot.NOISE, "rng": np.random.default_rng(0)}
+    contours = []
+    for point in ways * robot.HALF_AXES:
+        found = core.track(robot.Pebble(), point, point / robot.HALF_AXES**2, planes, **options)
+        contours += [core.Contour(c.points, noise=robot.NOISE) for c in found]
     seconds = []
     for _ in range(4):  # The first one imports what is needed.
         start = process_time()
         atlas = core.atlas_of(contours, tolerance=TOLERANCE)
         seconds.append(process_time() - start)
-    table(
-        ["touches", "contacts", "patches", "status", "s"],
-        [[str(count), str(sum(len(c.points) for c in contours)), str(len(atlas.patches)), atlas.status,
-          f"{np.median(seconds[1:]):.2f}"]],
-    )  # fmt: skip
+    contacts, patches = sum(len(c.points) for c in contours), len(atlas.patches)
+    row = [str(count), str(contacts), str(patches), atlas.status, f"{np.median(seconds[1:]):.2f}"]
+    table(["touches", "contacts", "patches", "status", "s"], [row])
+
+
+def print_robot(count):
+    """The touches of examples/robot.py with so many seeds, and those of `explore_object` on its pebble."""
+    robot, rows = example(), []
+    for seed in range(count):
+        path = Path(tempfile.mkdtemp()) / "contacts.csv"
+        with contextlib.redirect_stdout(io.StringIO()):
+            atlas = robot.run(path, TOLERANCE, 60, seed)
+        touches = len(core.contacts_from_csv(path.read_text()).strokes) // 3
+        options = {"tolerance": TOLERANCE, "noise": robot.NOISE, "rng": seed}
+        others = len(core.explore_object(robot.Pebble(), robot.START, robot.OUTWARD, **options).patches)
+        ways = np.random.default_rng(1).normal(size=(PLACES, 3))
+        places = robot.HALF_AXES * ways / np.linalg.norm(ways, axis=1, keepdims=True)
+        distance, std = atlas.distance(places)
+        off, within = np.abs(distance).mean(), np.mean(np.abs(distance) <= 1.645 * std)
+        rows.append([
+            str(seed), atlas.status, str(touches), str(others), f"{touches / others:.2f}", f"{off:.3f}",
+            f"{within:.2f}",
+        ])  # fmt: skip
+    head = ["seed", "status", "touches", "explore_object", "ratio", "off, mm", "within 90 %"]
+    table(head, rows)
 
 
 def main():
@@ -343,6 +365,7 @@ def main():
     parser.add_argument("--only", default="")
     parser.add_argument("--orientation", action="store_true")
     parser.add_argument("--touches", type=int, default=0)
+    parser.add_argument("--robot", type=int, default=0)
     options = parser.parse_args()
     for count, is_full in ((options.partial, False), (options.full, True)):
         if count:
@@ -352,6 +375,8 @@ def main():
             print_orientation(options.only, is_coarse)
     if options.touches:
         print_touches(options.touches)
+    if options.robot:
+        print_robot(options.robot)
     print(f"{machine('bpy', 'numpy', 'scipy')}.")
 
 

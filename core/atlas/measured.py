@@ -38,8 +38,8 @@ OFF = 0.03  # and not more than this share may be off or face the other way.
 ABREAST = 8  # So many neighbors of each contact are to face the same way.
 SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
 OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
-# Neighbors below centers lie the other way by this share, for this share of a center's links. Along edges that
-# is so by chance, at up to a ninth of all centers, and for a ball that is too large at this share of them.
+# A ball is too large if neighbors below its centers lie the other way by more than this share of their
+# distance, for more than this share of links, at more than this share of centers; edges have up to a ninth.
 TURNED = 0.25
 GROWN = 0.012  # Without a tolerance, patches grow up to this mean deviation, as a share of the radius.
 
@@ -232,7 +232,7 @@ class _Cloud(NamedTuple):
         return near[wall == wall[np.flatnonzero(near == i)]]
 
     def patches(self, places: Sequence[int], radius: float) -> list[Reconstruction | None]:
-        """The patch of those contacts around each of some that are of its wall; None where they carry none."""
+        """The patch of those contacts around each place that are of its wall; None where they carry none."""
         points, normals = self.contacts.points[places], self.contacts.normals[places]
         strokes = [[self.contacts.points[self.same_sheet(i, radius)]] for i in places]
         none: list[list[Contour]] = [[] for _ in places]
@@ -268,8 +268,8 @@ class _Cloud(NamedTuple):
         off = r.typical_miss > MISSED * max(self.noise, most)
         return None if off or r.mean_height_std > most else r
 
-    def largest_patch(self, i: int, radii: Array, last: int) -> tuple[Reconstruction | None, int]:
-        """The largest certain patch around contact i, or the smallest one, or None; which of the radii it has.
+    def largest_patch(self, i: int, radii: list[float], last: int) -> tuple[Reconstruction | None, int]:
+        """The largest certain patch around contact i, or the smallest one, or None; which radius it has.
 
         last : which of them the last patch had, for those of neighbors are of about one size
         """
@@ -328,7 +328,7 @@ def _patches(cloud: _Cloud) -> Generator[float, None, tuple[list[Reconstruction]
     Yields the share that is covered.
     """
     radius = yield from cloud.least_radius()
-    points, radii, last = cloud.contacts.points, radius * WIDENING ** np.arange(WIDENINGS), 0
+    points, radii, last = cloud.contacts.points, [radius * WIDENING**k for k in range(WIDENINGS)], 0
     left, found, tables = np.ones(len(points), dtype=bool), [], []
     for i in range(len(left)):
         if not left[i]:
