@@ -84,7 +84,7 @@ def cover_contacts(
     noise = None if noise is None else number("noise", noise, least=0.0)
     contacts, noise, doubt = _contacts(contours_or_strokes, outward, noise)
     yield 0.0
-    cloud = _Cloud(contacts, cKDTree(contacts.points), _linked(contacts.links), noise, largest)
+    cloud = _Cloud(contacts, cKDTree(contacts.points), noise, largest)
     found, charts = yield from _patches(cloud)
     reference = yield from part_of(joined_surface(found, charts, largest, contacts), 1.0, 1.0)
     places = uncovered_places(reference, charts)
@@ -205,30 +205,27 @@ def _off_contacts(atlas: Atlas, contacts: MeasuredContacts, noise: float) -> tup
     )
 
 
-def _linked(links: NDArray[np.intp]) -> Any:
-    """The sparse matrix (n, n) of links (n, k)."""
-    from scipy.sparse import csr_array
-
-    n, k = links.shape
-    return csr_array((np.ones(n * k), links.ravel(), np.arange(n + 1) * k), (n, n))
-
-
 class _Cloud(NamedTuple):
-    """Contacts, a KD-tree, a matrix of links, the noise, and the deviation up to which patches grow."""
+    """Contacts, a KD-tree, the noise, and the deviation up to which patches grow."""
 
     contacts: MeasuredContacts
     tree: Any
-    links: Any
     noise: float
     largest: float | None
 
     def same_sheet(self, i: int, radius: float) -> NDArray[np.intp]:
         """Those contacts around contact i that face the same way and are linked with it, so of its wall."""
+        from scipy.sparse import csr_array
         from scipy.sparse.csgraph import connected_components
 
         near = np.array(self.tree.query_ball_point(self.contacts.points[i], radius))
         near = near[self.contacts.normals[near] @ self.contacts.normals[i] > FACING]
-        wall = connected_components(self.links[near][:, near], directed=False)[1]
+        links, order = self.contacts.links[near], np.argsort(near)
+        at = order[np.minimum(np.searchsorted(near, links, sorter=order), len(near) - 1)]
+        linked = near[at] == links
+        ends = np.append(0, np.cumsum(linked.sum(axis=1)))
+        graph = csr_array((np.ones(ends[-1]), at[linked], ends), (len(near), len(near)))
+        wall = connected_components(graph, directed=False)[1]
         return near[wall == wall[np.flatnonzero(near == i)]]
 
     def patches(self, places: Sequence[int], radius: float) -> list[Reconstruction | None]:
