@@ -8,8 +8,9 @@ parallel planes, seeded. It prints Markdown tables:
 
 (a) N partial scans, of which a half space, all but a cap, or all but three curves are missing, and N full
     ones: how many are "ok"; of places at most one size away from contacts, how many have a finite
-    deviation, and how often the sign of these is wrong, at all of them and where the object is farther than
-    five deviations; how many of those up to a tenth of the size above felt area are finite; and how often
+    deviation, and how often the sign of these is wrong: at places spread evenly, at as many whose distance
+    from contacts has a deviation of .2, and at those of both where the object is farther than five
+    deviations; how many of those up to a tenth of the size above felt area are finite; and how often
     distances are within the 90 % interval. Every second scan has normals, the others have to be oriented;
 (b) with `--orientation`, every object of benchmarks.atlas_shapes, with gaps between strokes below half its
     thinnest wall, and 1.8 times as long: the share of contacts whose normals face outward, and the doubt. Of
@@ -215,7 +216,9 @@ def judged(thing, seed, is_full):
         "ok": atlas.status == "ok",
         "closed": mesh.is_closed,
         "finite": int(finite[: len(around)].sum()),
-        "wrong": int(wrong[: len(around)].sum()),
+        "even": int(finite[:PLACES].sum()),
+        "wrong": int(wrong[:PLACES].sum()),
+        "near wrong": int(wrong[PLACES : len(around)].sum()),
         "sure wrong": int(sure[: len(around)].sum()),
         "felt above": float(finite[len(around) :].mean()),
         "within": float(np.mean(np.abs(distance - truth)[finite] <= 1.645 * std[finite])),
@@ -244,7 +247,7 @@ def print_scans(only, seeds, is_full):
     for name, found in [*every.items(), ("all", [one for some in every.values() for one in some])]:
         if not found:
             continue
-        finite = sum(one["finite"] for one in found)
+        finite, even = (sum(one[key] for one in found) for key in ("finite", "even"))
         rows.append(
             [
                 name,
@@ -252,7 +255,8 @@ def print_scans(only, seeds, is_full):
                 str(sum(one["ok"] for one in found)),
                 str(sum(one["closed"] for one in found)),
                 f"{finite / len(found):.0f}",
-                f"{1e3 * sum(one['wrong'] for one in found) / max(finite, 1):.2f}",
+                f"{1e3 * sum(one['wrong'] for one in found) / max(even, 1):.2f}",
+                f"{1e3 * sum(one['near wrong'] for one in found) / max(finite - even, 1):.2f}",
                 f"{1e3 * sum(one['sure wrong'] for one in found) / max(finite, 1):.2f}",
                 f"{100 * np.mean([one['felt above'] for one in found]):.1f}",
                 f"{np.mean([one['within'] for one in found]):.3f}",
@@ -261,7 +265,7 @@ def print_scans(only, seeds, is_full):
         )
     head = [
         *("full scans of" if is_full else "partial scans of", "scans", "ok", "closed", "finite places"),
-        *("wrong signs, permille", "sure ones", "% finite above", "within 90 %", "s"),
+        *("wrong signs, permille", "near contacts", "sure ones", "% finite above", "within 90 %", "s"),
     ]
     table(head, rows)
 
