@@ -242,7 +242,11 @@ def _weighted_mean(pairs: Pairs, w: Array, count: int) -> Blend:
     there = some > 0.0
     scale = 1.0 / np.where(there, some, 1.0)
     mean = scale * total(pairs.distance)
-    variance = scale * total(pairs.std**2 + (pairs.distance - mean[place]) ** 2)
+    # A mean's squared error is the mean squared error minus the mean square by which patches differ from it.
+    spread = scale * total((pairs.distance - mean[place]) ** 2)
+    share = np.bincount(place, (w * scale[place]) ** 2, count)
+    apart = spread * share / np.maximum(1.0 - share, share)
+    variance = np.maximum(scale * total(pairs.std**2) - spread, apart)
     up = normalized(np.stack([total(pairs.normal[:, i]) for i in range(3)], axis=1))
     best = argmin_per_point(place, -w, count)
     return Blend(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import SMALLEST, Array, list_of, number, unit_vector, unit_vectors
-from ..contours.contour import Contour
+from ..contours.contour import Contour, equal_points
 from ..reconstruction.from_contours import reconstruct_many
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.start import TOUCH_ROUNDING, too_coarse
@@ -38,6 +38,9 @@ OFF = 0.03  # and not more than this share may be off or face the other way.
 ABREAST = 8  # So many neighbors of each contact are to face the same way.
 SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
 OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
+# A ball is too large if neighbors below its centers lie the other way by more than this share of their
+# distance, for more than this share of links, at more than this share of centers; edges have up to a ninth.
+TURNED = 0.25
 GROWN = 0.012  # Without a tolerance, patches grow up to this mean deviation, as a share of the radius.
 
 
@@ -81,7 +84,7 @@ def cover_contacts(
     noise = None if noise is None else number("noise", noise, least=0.0)
     contacts, noise, doubt = _contacts(contours_or_strokes, outward, noise)
     yield 0.0
-    cloud = _Cloud(contacts, cKDTree(contacts.points), _linked(contacts.links), noise, largest)
+    cloud = _Cloud(contacts, cKDTree(contacts.points), noise, largest)
     found, charts = yield from _patches(cloud)
     reference = yield from part_of(joined_surface(found, charts, largest, contacts), 1.0, 1.0)
     places = uncovered_places(reference, charts)
@@ -108,7 +111,8 @@ def _contacts(
     normals[~known] = sharpened(points, normals, planes)[~known]
     balls = np.repeat([stroke.ball or 0.0 for stroke in strokes], [len(some) for some in own])
     if balls.any():
-        points = points - balls[:, None] * normals
+        centers, points = points, points - balls[:, None] * normals
+        doubt = doubt or _beyond_bend(centers, points, planes.links)
         planes = planes_of(points, noise)
     return MeasuredContacts(points, normals, planes.reach, planes.links), noise, doubt
 
@@ -119,7 +123,7 @@ def _strokes(given: Sequence[ArrayLike | Contour], noise: float | None) -> tuple
         stroke if isinstance(stroke, Contour) else Contour(stroke)  # type: ignore[arg-type]
         for stroke in list_of("contours_or_strokes", given, object)  # type: ignore[arg-type]
     ]
-    points = np.vstack([np.empty((0, 3)), *(stroke.points for stroke in strokes)])
+    strokes, points = _each_once(strokes)
     if len(points) < FEWEST:
         raise ValueError(f"contours_or_strokes: expected {FEWEST} contacts or more, got {len(points)}")
     size = float(np.ptp(points, axis=0).max())
@@ -130,6 +134,20 @@ def _strokes(given: Sequence[ArrayLike | Contour], noise: float | None) -> tuple
     if noise > size:
         raise ValueError(f"noise: expected less than the size of what was felt, {size:.3g}, got {noise:.3g}")
     return strokes, points, noise
+
+
+def _each_once(strokes: list[Contour]) -> tuple[list[Contour], Array]:
+    """The strokes without contacts that earlier ones have, too, which tell no more; all contacts (n, 3)."""
+    points = np.vstack([np.empty((0, 3)), *(stroke.points for stroke in strokes)])
+    order, starts = equal_points(points)
+    is_first = np.zeros(len(points), dtype=bool)
+    is_first[order[starts]] = True
+    found, ends = [], np.cumsum([len(stroke.points) for stroke in strokes])
+    for stroke, end in zip(strokes, ends.tolist(), strict=True):
+        which = is_first[end - len(stroke.points) : end]
+        normals = None if stroke.normals is None else stroke.normals[which]
+        found.append(stroke if which.all() else replace(stroke, points=stroke.points[which], normals=normals))
+    return found, points[is_first]
 
 
 def _require_one_side(points: Array, normals: Array) -> None:
@@ -154,6 +172,22 @@ def _require_one_side(points: Array, normals: Array) -> None:
         )
 
 
+def _beyond_bend(centers: Array, contacts: Array, links: NDArray[np.intp]) -> tuple[str, str] | None:
+    """The status and a sentence, if a ball is larger than the bends of its centers (n, 3) at many of them.
+
+    There kappa_center < -1 / r, and contacts (n, 3) lie the other way around than their centers.
+    """
+    ways, below = (points[links] - points[:, None] for points in (centers, contacts))
+    turned = np.einsum("nki,nki->nk", ways, below) < -TURNED * np.einsum("nki,nki->nk", ways, ways)
+    beyond = turned.mean(axis=1) > TURNED
+    if beyond.mean() <= TURNED:
+        return None
+    return "uncertain", (
+        f"Centers around {place_text(centers[beyond])} bend more than a ball of this radius can: give the "
+        "radius of the ball, or use a smaller one."
+    )
+
+
 def _off_contacts(atlas: Atlas, contacts: MeasuredContacts, noise: float) -> tuple[str, str] | None:
     """The status and a sentence, if many contacts are off the surface or face the other way."""
     some = np.unique(np.linspace(0, len(contacts.points) - 1, CHECKED).astype(np.intp))
@@ -171,38 +205,36 @@ def _off_contacts(atlas: Atlas, contacts: MeasuredContacts, noise: float) -> tup
     )
 
 
-def _linked(links: NDArray[np.intp]) -> Any:
-    """The sparse matrix (n, n) of links (n, k)."""
-    from scipy.sparse import csr_array
-
-    n, k = links.shape
-    return csr_array((np.ones(n * k), links.ravel(), np.arange(n + 1) * k), (n, n))
-
-
 class _Cloud(NamedTuple):
-    """Contacts, a KD-tree, a matrix of links, the noise, and the deviation up to which patches grow."""
+    """Contacts, a KD-tree, the noise, and the deviation up to which patches grow."""
 
     contacts: MeasuredContacts
     tree: Any
-    links: Any
     noise: float
     largest: float | None
 
     def same_sheet(self, i: int, radius: float) -> NDArray[np.intp]:
         """Those contacts around contact i that face the same way and are linked with it, so of its wall."""
+        from scipy.sparse import csr_array
         from scipy.sparse.csgraph import connected_components
 
         near = np.array(self.tree.query_ball_point(self.contacts.points[i], radius))
         near = near[self.contacts.normals[near] @ self.contacts.normals[i] > FACING]
-        wall = connected_components(self.links[near][:, near], directed=False)[1]
+        links, order = self.contacts.links[near], np.argsort(near)
+        at = order[np.minimum(np.searchsorted(near, links, sorter=order), len(near) - 1)]
+        linked = near[at] == links
+        ends = np.append(0, np.cumsum(linked.sum(axis=1)))
+        graph = csr_array((np.ones(ends[-1]), at[linked], ends), (len(near), len(near)))
+        wall = connected_components(graph, directed=False)[1]
         return near[wall == wall[np.flatnonzero(near == i)]]
 
-    def patch(self, i: int, radius: float) -> Reconstruction | None:
-        """The patch of those contacts around contact i that face the same way, or None if they carry none."""
-        points, normals = self.contacts.points, self.contacts.normals
-        strokes, place, outward = [[points[self.same_sheet(i, radius)]]], points[i][None], normals[i][None]
-        (r,) = reconstruct_many(place, [()], outward=outward, strokes_list=strokes, noise=self.noise)
-        return r if isinstance(r, Reconstruction) else None
+    def patches(self, places: Sequence[int], radius: float) -> list[Reconstruction | None]:
+        """The patch of those contacts around each place that are of its wall; None where they carry none."""
+        points, normals = self.contacts.points[places], self.contacts.normals[places]
+        strokes = [[self.contacts.points[self.same_sheet(i, radius)]] for i in places]
+        none: list[list[Contour]] = [[] for _ in places]
+        found = reconstruct_many(points, none, outward=normals, strokes_list=strokes, noise=self.noise)
+        return [r if isinstance(r, Reconstruction) else None for r in found]
 
     def rim(self, i: int, r: Reconstruction) -> Array:
         """The radii (AZIMUTHS,) of a patch, in unit radius, as far as it has contacts beside it.
@@ -224,19 +256,33 @@ class _Cloud(NamedTuple):
         ended = np.where(empty.any(axis=0), empty.argmax(axis=0), RAY_PLACES)
         return domain * np.maximum(ended, 1) / RAY_PLACES
 
-    def largest_patch(self, i: int, radius: float) -> Reconstruction | None:
-        """The largest patch around contact i that is certain enough, or the smallest, or None."""
-        best = None
-        for _ in range(WIDENINGS):
-            r = self.patch(i, radius)
-            if r is None:
+    def certain_patch(self, i: int, radius: float) -> Reconstruction | None:
+        """The patch around contact i, or None if there is none, or it is uncertain or off its contacts."""
+        (r,) = self.patches([i], radius)
+        if r is None:
+            return None
+        most = self.largest or GROWN * r.radius
+        off = r.typical_miss > MISSED * max(self.noise, most)
+        return None if off or r.mean_height_std > most else r
+
+    def largest_patch(self, i: int, radii: list[float], last: int) -> tuple[Reconstruction | None, int]:
+        """The largest certain patch around contact i, or the smallest one, or None; which radius it has.
+
+        last : which of them the last patch had, for those of neighbors are of about one size
+        """
+        (smallest,) = self.patches([i], radii[0])
+        if smallest is None:
+            return None, last
+        found = self.certain_patch(i, radii[last])
+        if found is None:
+            smaller = ((self.certain_patch(i, radii[k]), k) for k in range(last - 1, 0, -1))
+            return next(((r, k) for r, k in smaller if r is not None), (smallest, 0))
+        for k in range(last + 1, len(radii)):
+            larger = self.certain_patch(i, radii[k])
+            if larger is None:
                 break
-            most = self.largest or GROWN * r.radius
-            off = r.typical_miss > MISSED * max(self.noise, most)
-            if best is not None and (off or r.mean_height_std > most):
-                break
-            best, radius = r, WIDENING * radius
-        return best
+            found, last = larger, k
+        return found, last
 
     def least_radius(self) -> Generator[float, None, float]:
         """The least radius at which patches exist at half of some places, for contacts may lie in lines.
@@ -248,7 +294,7 @@ class _Cloud(NamedTuple):
         radius = float(np.median(self.tree.query(points[some], FEWEST)[0][:, -1]))
         self._require_fine(radius)
         for _ in range(WIDENINGS):
-            if sum(self.patch(i, radius) is not None for i in some.tolist()) * 2 >= SOME_PLACES:
+            if sum(r is not None for r in self.patches(some.tolist(), radius)) * 2 >= SOME_PLACES:
                 return radius
             radius *= WIDENING
             yield 0.0
@@ -279,12 +325,12 @@ def _patches(cloud: _Cloud) -> Generator[float, None, tuple[list[Reconstruction]
     Yields the share that is covered.
     """
     radius = yield from cloud.least_radius()
-    points = cloud.contacts.points
+    points, radii, last = cloud.contacts.points, [radius * WIDENING**k for k in range(WIDENINGS)], 0
     left, found, tables = np.ones(len(points), dtype=bool), [], []
     for i in range(len(left)):
         if not left[i]:
             continue
-        r = cloud.largest_patch(i, radius)
+        r, last = cloud.largest_patch(i, radii, last)
         some = cloud.same_sheet(i, MISSING * radius)
         left[some] = False
         if r is not None:

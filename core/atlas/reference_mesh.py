@@ -31,6 +31,7 @@ CLOSED = 0.25  # and where the indicator is above its level by more: felt area i
 REACHES = 3.0  # the outside is known this many times farther than the foot is from the border,
 ABOVE = 0.12  # and up to this share of the size,
 BEYOND = 1.0  # and the surface is known this many edges beyond the border.
+TURNED = 1.0  # Beyond the border it goes on turned by this angle, in radians, at two deviations.
 ON_SIDE = 1e-6  # A foot with a smaller weight of a vertex is on the side across from it.
 
 
@@ -179,7 +180,8 @@ class ReferenceMesh:
         rim : (n,), distances from the border; behind : (n,), the indicator; ends : (n,), feet on the border
 
         What goes on beyond the border may come nearer than the foot, as far as the place is farther away than
-        the foot is from the border. Behind the surface the inside is known as far as other parts close it.
+        the foot is from the border. Behind the surface the inside is known as far as other parts close it,
+        and above it the outside where these do not contradict it.
         """
         beside = np.sqrt(np.maximum(rim**2 - away**2, 0.0))
         across = np.sqrt(np.maximum(away**2 - ahead**2, 0.0))
@@ -188,8 +190,10 @@ class ReferenceMesh:
             np.maximum(REACHES * beside, ABOVE * self.indicator.size),
         )
         inside = (away < shallow) | ((behind > CLOSED) & ~ends)
-        known = np.where(side < 0.0, inside, away < above) & (~ends | (across < BEYOND * self.mesh.edge))
-        growth = np.where(ends, np.maximum(across, away - shallow), away - beside)
+        outside = (away < above) & ((behind < 0.0) | (away < shallow))
+        known = np.where(side < 0.0, inside, outside) & (~ends | (across < BEYOND * self.mesh.edge))
+        nearer = 0.5 * (away * (1.0 - np.cos(TURNED)) - beside * np.sin(TURNED))
+        growth = np.where(ends, np.maximum(across, away - shallow), nearer)
         distance = np.where(ends, ahead, np.copysign(away, side))
         return distance, np.where(known, np.hypot(std, np.maximum(growth, 0.0)), np.inf)
 

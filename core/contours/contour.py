@@ -81,8 +81,7 @@ class Contour:
     stops : why tracking ended at the first and at the last point, or None
     normal_std : standard deviation of measured normals, in radians, with which "bayes" fits them as slopes;
       None leaves them out. The paper's methods never use them
-    ball : radius of a ball whose centers the points are, and so the reference point of their touch; None if
-      they are contacts
+    ball : radius of a ball whose centers the points are; None if they are contacts
 
     Repeated contacts, as of a sensor at rest, are there once, with the mean of their normals, because they
     tell no more.

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import SMALLEST, Array
+from ..contours.common_point import common_point
 from ..contours.contour import Contour
 from ..contours.local_geometry import DegenerateCurvesError
 from .result import Reconstruction
@@ -30,6 +31,16 @@ def ball_of(contours: Sequence[Contour], strokes: Sequence[ArrayLike | Contour])
         got = " and ".join(f"{ball:g}" if ball else "none" for ball in sorted(balls))
         raise ValueError(f"ball: expected one radius for all contours and strokes, got {got}")
     return balls.pop() if balls else 0.0
+
+
+def center_at(point: Array, contours: Sequence[Contour], ball: float) -> Array:
+    """The center (3,) where contours of centers meet: the reference point, or above it if that is a contact.
+
+    It is a contact if no center is nearer than half the ball's radius. Raises DegenerateCurvesError if
+    contours do not meet then.
+    """
+    away = [float(np.linalg.norm(contour.points - point, axis=1).min(initial=np.inf)) for contour in contours]
+    return point if min(away, default=0.0) < 0.5 * ball else common_point(contours)[0]
 
 
 def contacts_below(

@@ -19,7 +19,7 @@ from ..arguments import (
 from ..contours.contour import Contour
 from ..contours.curves import has_measured_normals
 from ..contours.local_geometry import DegenerateCurvesError
-from .ball import ball_of, contacts_below
+from .ball import ball_of, center_at, contacts_below
 from .options import FitOptions
 from .result import Reconstruction
 from .stacks import fitted_stack
@@ -45,7 +45,8 @@ def reconstruct(
     """The surface patch around `point` from three or more contours through it, from strokes, or from both.
 
     point : (3,), exact; outward : (3,), on the outer side of the surface. If the contours are those of a
-        ball's center, the point is a center, too, and the patch is that of the contacts
+        ball's center, the patch is that of the contacts, and the point is a center or, if no center is
+        nearer to it than half the ball's radius, a contact
     strokes : contacts beside the point, (n, 3) each or Contours, in the order in which they were felt, either
       way; their normals are not fitted. Only "bayes" fits them. With contours, those beyond the domain are
       ignored. Without contours the point is only a place: the origin is its projection onto the polynomial,
@@ -141,10 +142,11 @@ def _touch(
     if not ball:
         return p, touch
     by_default = replace(options, method="bayes", degree="auto")
-    centers = _fitted_one(p, touch, up, by_default)
+    center = center_at(p, contours, ball)
+    centers = _fitted_one(center, touch, up, by_default)
     balls = [stroke for stroke in strokes if isinstance(stroke, Contour)]
-    p, contours, balls = contacts_below(centers, contours, balls, ball)
-    return p, _given(contours, balls, options)
+    below, contours, balls = contacts_below(centers, contours, balls, ball)
+    return below if center is p else p, _given(contours, balls, options)
 
 
 def _fitted_one(p: Array, touch: Given, up: Array, options: FitOptions) -> Reconstruction:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import core
+from core.atlas import measured
 from tests import solids
 
 
@@ -265,3 +266,64 @@ def test_normals_that_contacts_have_count_and_the_others_follow_them():
     for outward in (None, (0, 0, -1)):
         contacts = core.atlas_of(half, outward=outward, tolerance=0.05).contacts
         assert np.einsum("ni,ni->n", contacts.points, contacts.normals) == pytest.approx(1.0, abs=0.05)
+
+
+def noisy_ball():
+    rng = np.random.default_rng(0)
+    return [ring + rng.normal(0.0, 1e-3, ring.shape) for ring in rings_of_ball(gap=0.1)]
+
+
+def test_deviations_are_those_of_the_mean_of_overlapping_patches():
+    atlas = core.atlas_of(noisy_ball(), noise=1e-3)
+    places = ball(2000)
+    distance, std = atlas.distance(places)
+    within = np.mean(np.abs(distance) <= 1.645 * std)
+    assert 0.8 < within < 0.99
+    assert np.median(std) < 3.0 * np.median(np.abs(distance))
+
+
+def test_above_a_cap_the_deviation_is_of_what_may_rise_beyond_its_rim():
+    out, heights = np.array([0.3, 0.35, 0.45]), np.array([0.5, 0.7, 0.7])
+    feet = np.column_stack([out, np.zeros(3), np.sqrt(1.0 - out**2)])
+    distance, std = cap_atlas().distance((1.0 + heights)[:, None] * feet)
+    assert distance == pytest.approx(heights, abs=0.01)
+    assert std[0] < 0.01 < std[1] < std[2] == np.inf
+
+
+def test_nothing_is_outside_where_the_other_parts_close_around_it():
+    reference = cap_atlas().reference
+    near, far = 0.5 * reference.indicator.cell, 5.0 * reference.indicator.cell
+    away, side = np.array([near, far, far]), np.array([near, far, far])
+    behind = np.array([0.4, 0.4, -0.4])
+    std, ends = np.full(3, 1e-3), np.zeros(3, dtype=bool)
+    rim = np.full(3, 1.0)
+    _, found = reference._distances_near_border(away, side, side, rim, std, behind, ends)
+    assert np.isfinite(found).tolist() == [True, False, True]
+
+
+def test_few_fits_find_how_large_patches_can_be(monkeypatch):
+    fits = []
+
+    def counted(points, *args, **options):
+        fits.append(len(points))
+        return fit(points, *args, **options)
+
+    fit = measured.reconstruct_many
+    monkeypatch.setattr(measured, "reconstruct_many", counted)
+    atlas = core.atlas_of(noisy_ball(), noise=1e-3)
+    assert sum(fits) < measured.SOME_PLACES + 4 * len(atlas.patches)
+
+
+def test_contacts_that_several_strokes_have_count_once():
+    strokes = noisy_ball()
+    atlas, places = core.atlas_of(strokes, noise=1e-3), ball(100)
+    for given in ([*strokes, *strokes], [*strokes, *([strokes[3][5]] for _ in range(20))]):
+        again = core.atlas_of(given, noise=1e-3)
+        assert np.array_equal(again.distance(places), atlas.distance(places))
+
+
+def test_a_ball_that_is_larger_than_its_centers_bend_is_a_doubt():
+    centers = [core.Contour(ring, ball=1.4) for ring in rings_of_ball()]
+    atlas = core.atlas_of(centers)
+    assert atlas.status == "uncertain"
+    assert "bend more than a ball of this radius can" in atlas.message

@@ -55,6 +55,19 @@ def test_the_patch_is_that_of_the_contacts(side, place, method):
 
 
 @pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_the_reference_point_may_be_a_contact(side, noise):
+    centers, contours = felt(side, 1, noise=noise, rng=0)
+    truth = ring(side, 1)
+    by_contact, by_center = (
+        core.reconstruct(point, contours, outward=centers.normal) for point in (truth.point, centers.point)
+    )
+    assert by_contact.frame.origin == pytest.approx(truth.point, abs=1e-12)
+    assert by_contact.patch.k1 == pytest.approx(by_center.patch.k1, rel=0.05)
+    assert by_contact.patch.k2 == pytest.approx(by_center.patch.k2, rel=0.05, abs=1e-3)
+
+
+@pytest.mark.parametrize("side", [1, -1])
 def test_deviations_hold_for_noisy_centers(side):
     within, truth = [], ring(side, 1)
     for seed in range(30):
