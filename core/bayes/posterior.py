@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What contacts show of a surface and what they leave open: a Gaussian process with explicit basis functions.
 
-Beside the paper, after Rasmussen and Williams (2006), section 2.7. In unit radius and in the Darboux frame,
+Not in the paper; after Rasmussen and Williams (2006), section 2.7. In unit radius and in the Darboux frame,
 
     z = phi' b + g,
 

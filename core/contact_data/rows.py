@@ -25,7 +25,7 @@ class Contacts(NamedTuple):
     unit : of all lengths, such as "mm"; "" if it is not known
     point : the reference point, three numbers, or None
     outward : a direction to the outer side, three numbers, or None
-    strokes : curves beside the reference point
+    strokes : curves that do not pass through the reference point
     """
 
     contours: list[Contour]

@@ -30,7 +30,7 @@ UNIT_METERS = {
 }
 VECTOR_KEYS, CURVE_KEYS = ("point", "outward"), ("noise", "normal_std", "ball")  # Keys of the comments.
 COLUMNS = ("curve", "time", *POINT_COLUMNS, *NORMAL_COLUMNS)
-STROKE = "stroke"  # The names of curves that run beside the reference point begin with this.
+STROKE = "stroke"  # The names of curves that do not pass through the reference point begin with this.
 
 
 def contacts_from_csv(text: str, name: str = "the table") -> Contacts:

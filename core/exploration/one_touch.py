@@ -19,7 +19,7 @@ from .taps import Tapped, adjacent_half_curves
 
 HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed --base).
 FINER = 8.0  # Steps are shorter by this factor if curves have too few contacts (benchmarks.atlas --shapes).
-# Half curves beside a contradiction, or all those of a touch in doubt, are shortened by this factor at once
+# Half curves next to a contradiction, or all those of a touch in doubt, are shortened by this factor at once
 SHORTER = 1.15  # (benchmarks.real --only taps),
 LEAST_SHARE = 0.25  # but not all of them to less than this share (benchmarks.real --only automatic).
 

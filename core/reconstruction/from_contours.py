@@ -26,7 +26,7 @@ from .stacks import fitted_stack
 from .start import Given
 from .strokes import gathered
 
-STACK = 4000  # So many contacts at once fit into a processor's cache (benchmarks.speed).
+STACK = 4000  # The number of contacts that fit into a processor's cache at once (benchmarks.speed).
 
 
 def reconstruct(
@@ -46,10 +46,11 @@ def reconstruct(
 
     point : (3,), exact; outward : (3,), on the outer side of the surface. If the contours are those of a
         ball's center, the point is a center, too, and the patch is that of the contacts
-    strokes : contacts beside the point, (n, 3) each or Contours, in the order in which they were felt, either
-      way; their normals are not fitted. Only "bayes" fits them. With contours, those beyond the domain are
-      ignored. Without contours the point is only a place: the origin is its projection onto the polynomial,
-      L is the distance of the farthest contact, and the domain is the hull of the contacts
+    strokes : curves that do not pass through the point, (n, 3) each or Contours, in the order in which their
+      contacts were felt, either way; their normals are not fitted. Only "bayes" fits them. With contours,
+      contacts beyond the domain are ignored. Without contours the point is only a place: the origin is its
+      projection onto the polynomial, L is the distance of the farthest contact, and the domain is the hull of
+      the contacts
     radius : without contours, use contacts up to this distance from the point; None for all
     method : "bayes" (bayes/joint_fit.py), or one of the paper's: "tagc" (9), "quadratic-variation",
         "least-squares" (5)
@@ -117,7 +118,7 @@ def fitted(
     # A stack has room for its longest contour in all places, so touches of similar size go together.
     sizes = [touch.size for touch in touches]
     results: dict[int, Reconstruction | DegenerateCurvesError] = {}
-    # Measured normals of some would cost time in the fits of all, and strokes alone start differently.
+    # Measured normals of some cost time in the fits of all, and touches without contours start differently.
     kinds = [(has_measured_normals(touch.contours), touch.strokes_only) for touch in touches]
     for kind in dict.fromkeys(kinds):
         order = [i for i in range(len(touches)) if kinds[i] == kind]

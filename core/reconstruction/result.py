@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A patch with its frame, and everything that may be asked of it."""
+"""A patch with its frame, and all results that follow from it."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -41,7 +41,7 @@ class Reconstruction:
     """A patch around a reference point, its contacts and all results, in the caller's unit.
 
     geometry : the surface that was found: the posterior's mean for "bayes", `patch` for other methods
-    patch : equation (1) of the degree asked for, in the frame
+    patch : equation (1) of the requested degree, in the frame
     contours : the fitted contours, in the world
     strokes : the other fitted contacts, in the world, (n, 3); means of neighbors if there are many
     noise : noise floor, the standard deviation that a contact has at least, in units of L
@@ -51,7 +51,7 @@ class Reconstruction:
     known_height_std : mean_height_std, if it is known already
     known_curves : the contours as Curves of one touch, in the world, if they are known already
 
-    All else is computed from these when it is asked for, so contours and strokes are copies that cannot be
+    All else is computed from these when it is first used, so contours and strokes are copies that cannot be
     written to.
     """
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measured normals as slopes in the Bayesian fit: they show what curves alone cannot."""
+"""Measured normals as slopes in the Bayesian fit: they show what curves without normals cannot."""
 
 from dataclasses import replace
 from functools import cache
@@ -356,10 +356,10 @@ def test_too_few_normals_contradict_nothing():
     surface = surfaces.pear()
     r = surface.fit(touched(surface, 0.02))
     contacts = r.contacts / r.radius
-    for count, told in ((0, False), (2, False), (30, True)):
+    for count, contradicts in ((0, False), (2, False), (30, True)):
         normals = np.tile([60.0, 0.0, 80.0], (count, 1))
         deviations, angle = contradiction(contacts[:count], normals, r.posterior)
-        assert (deviations > 5.0, angle > 0.5) == (told, told)
+        assert (deviations > 5.0, angle > 0.5) == (contradicts, contradicts)
 
 
 @pytest.mark.parametrize(

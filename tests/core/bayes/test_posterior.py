@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Bayesian fit: its algebra, its accuracy, and that it knows what it cannot see."""
+"""The Bayesian fit: its algebra, its accuracy, and wide intervals where contacts show nothing."""
 
 from dataclasses import replace
 
@@ -42,8 +42,8 @@ def test_intervals_count_in_that_waviness_and_noise_are_estimates(count, freedom
     hyper = data.hyperparameters(np.array([2e-3]))
     found = sextic.posterior_given(expected, data, hyper).at(0).covariance
     precision = data.heights[0, :-1, :-1] / hyper.noise**2 + np.diag(1.0 / hyper.prior[0])
-    alone = np.linalg.inv(precision)
-    assert found == pytest.approx(freedom / (freedom - 2.0) * alone, rel=1e-6)
+    gaussian = np.linalg.inv(precision)
+    assert found == pytest.approx(freedom / (freedom - 2.0) * gaussian, rel=1e-6)
 
 
 def test_the_patch_of_a_lower_degree_is_the_nearest_over_the_disk():
@@ -333,11 +333,11 @@ def test_a_degree_will_do_whose_patch_departs_by_half_a_deviation(ratio, degree)
     contacts = np.column_stack([rng.uniform(-0.9, 0.9, (50, 2)), np.zeros(50)])
     mean = np.zeros(27)
     mean[14] = 0.1
-    alone = posterior.SurfacePosterior(mean, np.eye(28), 0.0, np.zeros((22, 22)))
+    uncertain = posterior.SurfacePosterior(mean, np.eye(28), 0.0, np.zeros((22, 22)))
     basis = monomials(contacts[:, 0], contacts[:, 1], TERMS)
-    off = basis @ (mean - posterior.coefficients_of(alone.patch(4)))
+    off = basis @ (mean - posterior.coefficients_of(uncertain.patch(4)))
     variance = np.sum(off**2) / ratio**2 / np.sum(basis**2)
-    assert replace(alone, root=np.sqrt(variance) * np.eye(28)).degree_shown(contacts) == degree
+    assert replace(uncertain, root=np.sqrt(variance) * np.eye(28)).degree_shown(contacts) == degree
 
 
 def test_an_outlying_contact_weighs_as_under_students_distribution():
@@ -374,7 +374,7 @@ def test_the_suggested_plane_is_nearly_the_best_of_all_that_there_are():
         count, noise = len(r.contacts) / 3, r.posterior.noise**2
 
         def lost_at_all(most, c=covariances, weights=weights, count=count, noise=noise):
-            return next_plane._lost(c, next_plane.TRIED, most, noise * most / count) @ weights
+            return next_plane._variance_reduction(c, next_plane.TRIED, most, noise * most / count) @ weights
 
         lost, few = lost_at_all(round(count)), lost_at_all(next_plane.FEW_CONTACTS)
         plane, _ = suggest_plane(r)

@@ -25,7 +25,7 @@ from core.bayes.prior import USUAL_WAVINESS, prior_variances
 from core.bayes.process_fit import process_posterior, touch_of
 from core.patch.monge import TERMS, exponents, monomials
 from core.reconstruction.deviations import mean_height_stds
-from core.reconstruction.next_plane import TRIED, _lost
+from core.reconstruction.next_plane import TRIED, _variance_reduction
 
 EXTENT = 12.0
 OUTWARD = np.array([0.0, 0.0, 1.0])
@@ -264,13 +264,13 @@ def test_a_stack_of_rough_and_smooth_touches_gives_what_each_gives_alone():
     )
     points[3], outward[3] = smooth.point, smooth.normal
     found = reconstruct_many(points, touches, outward=outward)
-    alone = [reconstruct(*each, outward=n) for *each, n in zip(points, touches, outward, strict=True)]
+    singles = [reconstruct(*each, outward=n) for *each, n in zip(points, touches, outward, strict=True)]
     assert [r.posterior.amplitude > 0.0 for r in found] == [True, False, True, False, True]
-    for one, other in zip(found, alone, strict=True):
+    for one, other in zip(found, singles, strict=True):
         x, y = over(other).T
         assert one.height(x, y) == pytest.approx(other.height(x, y), abs=1e-6)
         assert one.height_std(x, y) == pytest.approx(other.height_std(x, y), rel=1e-5, abs=1e-9)
-    assert mean_height_stds(found) == pytest.approx([r.mean_height_std for r in alone], rel=1e-5)
+    assert mean_height_stds(found) == pytest.approx([r.mean_height_std for r in singles], rel=1e-5)
 
 
 def test_more_contacts_than_places_say_as_much():
@@ -303,9 +303,10 @@ def test_the_suggested_plane_tells_as_much_as_any_of_all(seed):
     points, weights = r.domain.nodes
     covariances = r.posterior.covariances_with(points / r.radius)
     widening = r.widening(r.domain.node_places)
-    told = widening**2 * _lost(covariances, TRIED, 24, r.posterior.noise**2) @ weights
+    reductions = _variance_reduction(covariances, TRIED, 24, r.posterior.noise**2)
+    lowered = widening**2 * reductions @ weights
     chosen = np.argmin(np.abs(TRIED - suggest_plane(r)[0].azimuth))
-    assert told[chosen] >= 0.97 * told.max()
+    assert lowered[chosen] >= 0.97 * lowered.max()
 
 
 def test_deviations_are_less_near_the_point_and_more_at_the_rim_and_a_contour_takes_off_as_much():
