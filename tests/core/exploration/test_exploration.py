@@ -95,12 +95,12 @@ def short_waves():
 
 
 def test_what_is_too_rough_for_any_fit_to_be_trusted_is_not_fitted(monkeypatch):
-    asked = []
-    monkeypatch.setattr(side_by_side, "fitted", lambda *given: asked.append(1) or fitted(*given))
-    found, few = explore(short_waves()), len(asked)
+    fits = []
+    monkeypatch.setattr(side_by_side, "fitted", lambda *given: fits.append(1) or fitted(*given))
+    found, few = explore(short_waves()), len(fits)
     monkeypatch.setattr(growth, "ROUGHNESS_LIMIT", np.inf)
     assert explore(short_waves()).extent == found.extent
-    assert len(asked) - few > few
+    assert len(fits) - few > few
 
 
 def fits_of(monkeypatch, surface, **more):
@@ -158,7 +158,7 @@ def test_rough_curves_are_fitted_where_shorter_ones_carry_no_fit(monkeypatch):
 
 @pytest.mark.parametrize("largest_std", [None, 1.0])
 def test_among_seeds_in_doubt_the_longest_that_is_sure_is_taken(largest_std, monkeypatch):
-    """Where no deviation is asked for, a longer seed is as good as a short one in less doubt."""
+    """Where no deviation is requested, a longer seed is as good as a short one in less doubt."""
     spreads, sure = {24: 1.7, 12: 1.4, 6: 1.3, 3: 1.1}, {24: False, 12: True, 6: True, 3: False}
 
     class Trial(growth.GrowthTrial):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mesh of a patch: as fine as asked, no slivers, symmetric, and of few triangles where it is flat."""
+"""The mesh of a patch: as fine as requested, no slivers, symmetric, and of few triangles where it is flat."""
 
 from functools import cache
 

@@ -175,13 +175,13 @@ def test_principal_directions_that_may_be_far_off():
 def test_the_frame_is_hardly_ever_off_by_more_than_the_angle_that_is_told():
     s = surfaces.pear()
     exact = s.fit(contours_of(s, noise=0.0)).frame.axes
-    angles, told = [], []
+    angles, bounds = [], []
     for seed in range(60):
         r = s.fit(contours_of(s, noise=0.1, seed=seed))
         angles.append(np.arccos(min(1.0, abs(exact[:, 0] @ r.frame.axes[:, 0]))))
-        told.append(r.posterior.turn())
-    assert np.mean(np.array(angles) <= told) > 0.9
-    assert np.mean(told) < 4.0 * np.sqrt(np.mean(np.square(angles)))
+        bounds.append(r.posterior.turn())
+    assert np.mean(np.array(angles) <= bounds) > 0.9
+    assert np.mean(bounds) < 4.0 * np.sqrt(np.mean(np.square(angles)))
 
 
 @pytest.mark.parametrize("surface", [surfaces.pear(), surfaces.ellipsoid(30, 28, 27, 0.4, 0.5)])
@@ -327,12 +327,12 @@ def test_the_frame_may_be_ten_degrees_off_and_curvatures_a_tenth_of_one_over_the
 
 
 @pytest.mark.parametrize(
-    ("deviations", "angle", "told"), [(5.5, 0.011, True), (5.5, 0.009, False), (4.5, 0.011, False)]
+    ("deviations", "angle", "uncertain"), [(5.5, 0.011, True), (5.5, 0.009, False), (4.5, 0.011, False)]
 )
-def test_normals_contradict_by_five_deviations_and_a_hundredth(deviations, angle, told):
+def test_normals_contradict_by_five_deviations_and_a_hundredth(deviations, angle, uncertain):
     r = surfaces.pear().fit(contours_of(surfaces.pear()))
     vars(r)["contradiction"] = (deviations, angle)
-    assert (r.status == "uncertain") is told
+    assert (r.status == "uncertain") is uncertain
 
 
 def waves(length, height, azimuth, k2=-0.01):
@@ -376,8 +376,8 @@ def test_low_waves_and_waves_that_strokes_show_are_none_to_doubt():
             contours = surface.track(surfaces.planes((0, 60, 120)), extent=13, step=13 / 24)
             x, y = rng.uniform(-9.0, 9.0, (2, strokes))
             flat = np.column_stack([x, y, np.full(strokes, 13.0)])
-            beside = [surface.crossings(flat, np.array([0.0, 0.0, -1.0]), 26.0)] if strokes else []
-            assert "Waves" not in surface.fit(contours, strokes=beside).message
+            scattered = [surface.crossings(flat, np.array([0.0, 0.0, -1.0]), 26.0)] if strokes else []
+            assert "Waves" not in surface.fit(contours, strokes=scattered).message
 
 
 def test_outlying_contacts_are_no_waves():

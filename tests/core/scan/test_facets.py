@@ -44,7 +44,7 @@ class Prism:
 
 
 def arc(facets, bend=60.0):
-    """An arc of radius 1 that bends by so many degrees to either side, in facets."""
+    """An arc of radius 1 that bends by `bend` degrees to either side, in facets."""
     angles = np.radians(np.linspace(-bend, bend, facets + 1))
     return Prism(np.column_stack([np.sin(angles), np.cos(angles)]))
 
