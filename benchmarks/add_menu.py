@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender's Add menu has, touched all over with the dialog's defaults, beside the result.
+"""The meshes of Blender's Add menu, touched all over with the dialog's defaults.
 
 `python -m benchmarks.add_menu ZIP [--only NAME]`, from the root of a checkout; ZIP is the built extension.
 It prints a Markdown table and draws build/charts/add_menu.jpg, objects above and what was felt of them below.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long fits and automatic touches take beside those of an older checkout and scipy's thin plate.
+"""How long fits and automatic touches take, compared with an older checkout and scipy's thin plate.
 
 `python -m benchmarks.speed --base ROOT` prints it; ROOT is any worktree of this repository. Each checkout
 runs in a process of its own on the same cases. The two take turns, so that other programs slow down both.
