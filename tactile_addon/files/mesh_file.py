@@ -11,7 +11,7 @@ import numpy as np
 from ..touch.types import Object
 from . import mesh_numbers, ply_contacts, whole_file
 
-HEADER = 1 << 16  # The header of a .ply ends within so many bytes.
+HEADER = 1 << 16  # The header of a .ply ends within this many bytes.
 INCOMPLETE = "Blender has not written all of it"
 # The operators that import files with these endings, and their options.
 IMPORTS = {

@@ -87,7 +87,7 @@ class InSlices(OperatorMixin):
             return report_error(self, error)
 
     def _go_on(self, context: bpy.types.Context) -> Outcome:
-        """Makes the window do the steps."""
+        """Starts a timer in the window, whose events do the rest of the steps in `modal`."""
         self._timer = context.window_manager.event_timer_add(NEXT, window=context.window)
         context.workspace.status_text_set(_status(self.stop, *self._done()))
         context.window_manager.modal_handler_add(self)

@@ -20,7 +20,7 @@ from . import anchor
 from .probe import DIGEST, patch_of, record_of
 
 NO_SHAPE = " 00000000"  # The end of settings.shape for a mesh that cannot be touched.
-VERTICES = 1000  # At most so many vertices around are compared with the patch; a quarter or more lie over it.
+VERTICES = 1000  # At most this many vertices around the patch are compared; a quarter or more lie over it.
 
 
 def _put(probe: Object, touched: Touched) -> None:
@@ -223,7 +223,7 @@ def measure_shape(
 ) -> None:
     """Keeps the checksum of the target, computed anew if the target is one of the `reshaped` objects.
 
-    reshaped : a dict that gets the checksum of each object that is asked for, so that it is computed once
+    reshaped : a dict that gets the checksum of each object that is needed, so that it is computed once
     """
     target, reshaped = settings.target, {} if reshaped is None else reshaped
     if target is None or (settings.shape.startswith(f"{target.session_uid} ") and target not in reshaped):

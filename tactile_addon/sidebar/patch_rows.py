@@ -11,7 +11,7 @@ from ..touch import units
 from ..touch.touch_report import TouchReport
 from ..touch.units import Unit
 
-FLAT_DEVIATIONS = 2.0  # A curvature within so many deviations of 0 has no radius.
+FLAT_DEVIATIONS = 2.0  # A curvature within this many deviations of 0 has no radius.
 FLATTEST = 1e-3  # Nor has one whose radius is a thousand times the patch's.
 ZERO = 1e-6  # A number below this, in unit radius, counts as 0.
 

@@ -76,7 +76,7 @@ class TouchReport(TypedDict, total=False):
     mean_curvature_std: float
     shape_index: float
     curvedness: float
-    residual: float  # The amplitude of the process beside the polynomial.
+    residual: float  # The amplitude of the process that is added to the polynomial.
     coefficients: list[float]  # Those of equation (1).
     radius: float
     contacts: int
