@@ -392,8 +392,8 @@ def test_where_curves_meet_is_told_in_double_precision(command, empty, tmp_path)
             rows.append(f"{azimuth},{','.join(map(repr, place.tolist()))}")
     path = tmp_path / "curves.csv"
     path.write_text("\n".join(rows))
-    told = ["--point", *map(repr, point.tolist())]
-    code, out, _ = command("fit", path, *told, "--outward", 0, 0, 1, "--json", "-")
+    given = ["--point", *map(repr, point.tolist())]
+    code, out, _ = command("fit", path, *given, "--outward", 0, 0, 1, "--json", "-")
     assert code == 0
     report = json.loads(next(line for line in out.splitlines() if line.startswith("{")))
     assert report["frame"]["origin"] == point.tolist()

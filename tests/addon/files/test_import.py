@@ -188,15 +188,15 @@ def test_contacts_in_any_order_are_drawn_along_their_curve(empty, measured):
 
 
 def test_what_a_file_says_of_its_patch_counts_unless_something_else_is_given(empty, measured, tmp_path):
-    """The file names the side opposite to the bulge, and a point beside where the curves meet."""
+    """The file names the side opposite to the bulge, and a point near the one where the curves meet."""
     path = Path(measured(normals=False))
     point, down = SURFACE.point + 0.01 * SURFACE.normal, -SURFACE.normal
-    told = "".join(
+    comments = "".join(
         f"# {key} {' '.join(map(repr, values.tolist()))}\n"
         for key, values in (("point", point), ("outward", down))
     )
     title, *rows = path.read_text().splitlines(keepends=True)
-    path.write_text(title + told + "# noise 0.5\n" + "".join(rows))
+    path.write_text(title + comments + "# noise 0.5\n" + "".join(rows))
     _, report = imported(empty, str(path))
     assert report["frame"]["origin"] == pytest.approx(point, rel=1e-12)
     assert np.dot(report["frame"]["normal"], down) > 0.99

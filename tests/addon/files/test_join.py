@@ -38,9 +38,9 @@ ROWS = np.linspace(-1.0, 1.0, 17)
 def write(extension, empty, tmp_path):
     """A function that writes strokes to a file of a given name and returns the path."""
 
-    def write(name, strokes, **told):
+    def write(name, strokes, **known):
         contact_file = extension.tactile_addon.files.contact_file
-        contact_file.write(tmp_path / name, Contacts([], "", strokes=tuple(strokes), **told))
+        contact_file.write(tmp_path / name, Contacts([], "", strokes=tuple(strokes), **known))
         return tmp_path / name
 
     return write

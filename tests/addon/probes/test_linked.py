@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Probes and patches of a library: grayed out and left alone where they are linked, alive as overrides."""
+"""Probes and patches of a library: grayed out and unchanged where they are linked, alive as overrides."""
 
 import math
 
