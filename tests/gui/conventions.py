@@ -3,7 +3,7 @@
 """Run in a window of Blender on the scene of make_scene.py: what users expect of any extension.
 
 It checks search, menus, Adjust Last Operation, presets, grayed-out buttons, the tab and large letters. Every
-step asserts on Blender's data and leaves a picture, to be looked at, beside the scene.
+step asserts on Blender's data and leaves a picture, to be looked at, next to the scene.
 """
 
 import math
