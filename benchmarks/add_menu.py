@@ -25,7 +25,7 @@ from tools import blender, demo
 
 from . import ROOT, SCANS_FOLDER, machine, table
 
-APART, SIZE = 1.1, 1.05  # Objects are so far apart in the picture, and their diagonal is so long.
+APART, SIZE = 1.1, 1.05  # The distance of objects in the picture, and the length of their diagonals.
 COLUMNS, WIDTH, SAMPLES = 6, 1800, 48
 TINTS = ((0.35, 0.35, 0.34, 1.0), (0.16, 0.3, 0.5, 1.0))  # Of objects, and of what was felt of them.
 

@@ -145,7 +145,7 @@ def angle(long, wide, depth):
 
 
 def tee(stem, long, width, high, depth):
-    """A T: a bar of this width and height on a stem that is so wide and long."""
+    """A T: a bar of this width and height on a stem of this width and length."""
     s, w, top = 0.5 * stem, 0.5 * width, long + high
     polygon = [(-s, 0), (s, 0), (s, long), (w, long), (w, top), (-w, top), (-w, long), (-s, long)]
     cap = [(0, 1, 2), (0, 2, 7), (2, 3, 4), (2, 4, 5), (2, 5, 7), (7, 5, 6)]

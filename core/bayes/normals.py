@@ -79,7 +79,7 @@ def contradiction(contacts: Array, normals: Array, posterior: SurfacePosterior) 
     contacts, normals : (n, 3), of `measured_normals`
     posterior : of the contacts without their normals, in the same frame and unit; without a process
 
-    The angle is in radians. Both are 0 if there are too few normals to tell.
+    The angle is in radians. Both are 0 if there are too few normals to judge.
     """
     if 2 * len(normals) <= FREE:
         return 0.0, 0.0

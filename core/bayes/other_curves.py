@@ -28,7 +28,7 @@ def contradicting_curve(
     posterior : of all contacts; noise : least deviation of a contact
 
     Both are medians over the outer contacts of the curve that is off by most deviations, so outliers do not
-    count. They are 0 if there are too few curves to tell.
+    count. They are 0 if there are too few curves to judge.
     """
     numbers = np.unique(curve)
     if len(numbers) < ENOUGH:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The fit with a process, where contacts ask for it: a Gaussian process with explicit basis functions.
+"""The fit with a process, where evidence favors it: a Gaussian process with explicit basis functions.
 
 A real surface has different curvatures at each scale, and those at the point itself belong to its texture.
 So its frame and curvatures are those of the quartic that is nearest to z over a disk (SurfacePosterior's
@@ -69,7 +69,7 @@ def touch_of(contacts: Array, roots: Array, normals: Array, places: NDArray[np.i
 def process_fit(
     given: Observations, weights: Array, posterior: SurfacePosterior, ranks: NDArray[np.intp], through: bool
 ) -> tuple[Array, Array, list[SurfacePosterior]]:
-    """The fits of b touches, with a process where their contacts ask for one, and unchanged elsewhere.
+    """The fits of b touches, with a process where the evidence favors one, and unchanged elsewhere.
 
     given : in the Darboux frames of the sextics, whose posteriors are a stack
     weights : (b, n), 0 where there is no contact

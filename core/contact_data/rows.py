@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rows of contacts as arrays: many at once, or one by one to say what is wrong with which."""
+"""Rows of contacts as arrays: many at once, or one by one to find the row that is wrong."""
 
 import csv
 import math

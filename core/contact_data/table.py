@@ -132,7 +132,7 @@ def _with(name: str, contour: Contour, key: str, std: float | None) -> Contour:
 
 
 def _metadata(name: str, text: str) -> dict[str, Any]:
-    """What the comments of a text that `contacts_to_csv` has written say, by key; nothing for others."""
+    """The values in the comments of a text that `contacts_to_csv` has written, by key; {} for others."""
     if not text.startswith(TITLE):
         return {}
     metadata: dict[str, Any] = {}

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Total absolute Gaussian curvature against the contacts: the objective (9) and two minimizations (IV-B).
 
-lambda stays as it is given. The paper updates it from step to step, but does not say how, and its text takes
-the gradient of f + lambda g although (9) is g + lambda f.
+lambda stays as it is given. The paper updates it from step to step by a rule that it does not state, and its
+text takes the gradient of f + lambda g although (9) is g + lambda f.
 """
 
 from typing import NamedTuple

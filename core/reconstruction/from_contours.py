@@ -60,7 +60,7 @@ def reconstruct(
     solver : for "tagc", "fast" (Newton, from the quadric) or "descent" (the paper's, from its start)
 
     Raises ValueError for bad arguments, DegenerateCurvesError for contours that cannot carry the
-    method. The status of the result tells a fit in doubt.
+    method. A fit in doubt has another status than "ok".
 
     >>> s, azimuths = np.linspace(-0.5, 0.5, 21), np.radians([0, 60, 120])  # meridians of the unit ball
     >>> meridian = lambda a: Contour(np.stack([np.sin(s) * np.cos(a), np.sin(s) * np.sin(a), np.cos(s)], 1))

@@ -17,7 +17,7 @@ TRIED = np.radians(np.arange(0.0, 180.0, 3.0))
 COARSE_STRIDE = 5  # Each fifth of them is tried first, with contours of FEW_CONTACTS,
 FEW_CONTACTS = 8
 NEARBY = np.arange(-(COARSE_STRIDE // 2), COARSE_STRIDE // 2 + 1)  # and then those next to the best.
-TELLING_CONTACTS = 24  # More contacts tell no more of a contour's seven terms than as many with less noise.
+MOST_CONTACTS = 24  # More contacts show a contour's seven terms no better than this many with less noise.
 
 
 def suggest_plane(
@@ -50,7 +50,7 @@ def suggest_plane(
     tried = np.arange(0, len(TRIED), COARSE_STRIDE)
     near = tried[[np.argmax(reduction(tried, FEW_CONTACTS) @ weights)]] + NEARBY
     best = near[[np.argmax(reduction(near, FEW_CONTACTS) @ weights)]] % len(TRIED)
-    variance = np.maximum((r.node_stds / r.radius) ** 2 - reduction(best, TELLING_CONTACTS)[0], 0.0)
+    variance = np.maximum((r.node_stds / r.radius) ** 2 - reduction(best, MOST_CONTACTS)[0], 0.0)
     azimuth, (d1, _, n) = float(TRIED[best[0]]), r.frame.axes.T
     direction = SamplingPlane(azimuth).axes(n, d1)[:, 0]
     if outward is not None:

@@ -145,7 +145,7 @@ class Reconstruction:
     def widening(self, outward: Array) -> Array:
         """The factor (n,) of a process's deviations at these shares (n,) of the domain's radius.
 
-        Near the point, where curves meet, real surfaces are smoother than their covariance says, and near the
+        Near the point, where curves meet, real surfaces are smoother than by their covariance, and near the
         rim they are rougher. The mean over the domain is 1.
         """
         near = NEAR_POINT if self.posterior.amplitude else 1.0
@@ -305,7 +305,7 @@ class Reconstruction:
 
     @cached_property
     def curve_contradiction(self) -> tuple[float, float]:
-        """The number of deviations, and the share of L, by which a curve is off what the others tell."""
+        """The number of deviations, and the share of L, by which a curve is off what the others show."""
         if self.method != "bayes":
             return 0.0, 0.0
         counted = [distances_from_point(contour.points - self.frame.origin)[1] for contour in self.contours]

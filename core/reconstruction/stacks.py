@@ -81,7 +81,7 @@ def _fit(start: Start, options: FitOptions) -> _Fit:
 
 
 def _with_processes(start: Start, fit: _Fit, posteriors: SurfacePosterior, weights: Array) -> _Fit:
-    """The joint fit in unit radius; where contacts ask for a process, with it and in its frame."""
+    """The joint fit in unit radius; where evidence favors a process, with it and in its frame."""
     points, axes, radii, contacts = fit[:4]
     if start.strokes_only:
         offset = (weights * posteriors.residuals(contacts)).sum(axis=1) / weights.sum(axis=1)

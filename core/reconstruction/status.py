@@ -12,7 +12,7 @@ from ..bayes.posterior import CONFIDENCE, terms_to
 from ..contours.contour import SURFACE_ENDS
 from ..patch.domain import AT_POINT
 
-# benchmarks.stability chose these, and benchmarks.real LIKELY and what taps say. A fit is in doubt beyond
+# benchmarks.stability chose these, and benchmarks.real LIKELY and those of taps. A fit is in doubt beyond
 # them.
 DOUBTFUL_STD = 0.02  # Mean deviation of the height over the domain, as a share of the radius.
 DOUBTFUL_WAVES = 0.012  # What a quartic leaves of a rough surface along its curves, as a share of the radius.
@@ -101,7 +101,7 @@ def _is_at_edge(r: Judged) -> bool:
 
 
 def notes(r: Judged) -> str:
-    """What else there is to say, whatever the status: sentences, each after a space."""
+    """Further notes, whatever the status: sentences, each after a space."""
     message = ""
     if r.taps is not None and r.taps.missed:
         message += f" {r.taps.missed} of {r.taps.number} taps between the curves feel no surface."

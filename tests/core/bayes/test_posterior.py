@@ -205,7 +205,7 @@ def test_many_contacts_suggest_what_fewer_of_less_noise_do(monkeypatch):
     contours = track(s, s.point, s.normal, THREE, extent=12, step=0.1, noise=0.03, rng=0)
     r = reconstruct(s.point, contours, outward=s.normal)
     plane, expected = suggest_plane(r)
-    monkeypatch.setattr("core.reconstruction.next_plane.TELLING_CONTACTS", 1000)
+    monkeypatch.setattr("core.reconstruction.next_plane.MOST_CONTACTS", 1000)
     all_of_them = suggest_plane(r)
     assert plane == all_of_them[0]
     assert expected == pytest.approx(all_of_them[1], rel=0.01)
