@@ -45,7 +45,7 @@ def add(path: Path, empty: bool = False) -> Object:
     there = set(bpy.data.objects)
     operator, options = IMPORTS[path.suffix.lower()]
     try:
-        # Importers ask for a window, and after `blender -b` none is current.
+        # Importers need a window, and after `blender -b` none is current.
         with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
             getattr(bpy.ops.wm, operator)(filepath=str(path.absolute()), **options)
     except RuntimeError as error:

@@ -28,7 +28,7 @@ SETTLE = 0.25  # A gesture counts as ended after this many seconds without a cha
 EVENT_SLICE = 0.2  # In a window, work between two events takes this many seconds.
 CHEAP = 0.05  # A touch that takes at most this many seconds is made in every frame of an animation.
 
-_unsure = True  # Whether any patch may differ from what its inputs ask for, as after undo.
+_unsure = True  # Whether any patch may be that of other inputs than it has, as after undo.
 _seen = None  # The scene and view layer that were looked at last.
 
 

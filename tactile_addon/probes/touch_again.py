@@ -168,7 +168,7 @@ def may_be_outdated(probe: Object, there: Container[Object]) -> bool:
 
 
 def is_outdated(probe: Object, depsgraph: bpy.types.Depsgraph) -> bool:
-    """Whether the patch differs from what the inputs ask for, by the digests of probe and patch."""
+    """Whether the patch is that of other inputs than the probe has, by the digests of both."""
     (touched, name), made = _signed(probe.tactile_probe), _made(probe)
     meshes = patch_object.meshes(patch_of(probe))
     if name != probe.name and (not meshes or any(mesh.users > 1 for mesh in meshes)):

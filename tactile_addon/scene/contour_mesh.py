@@ -39,7 +39,7 @@ class _Form(NamedTuple):
 def fill_contours(mesh: bpy.types.Mesh, touched: Touched) -> None:
     """Tubes along the contours and an octahedron at each contact, in the Darboux frame.
 
-    Point attributes tell them apart: `contour` is the number of the contour, and -1 for strokes and the rim;
+    Point attributes number them: `contour` is the number of the contour, and -1 for strokes and the rim;
     `contact` is the number of the contact along it, and -1 on tubes and the rim. All of this only shows what
     the patch keeps in its reconstruction.
     """

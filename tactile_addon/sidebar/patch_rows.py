@@ -48,7 +48,7 @@ def other_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
 
 
 def plane_rows(record: TouchReport, unit: Unit) -> list[tuple[str, str]]:
-    """(label, value) of the plane that would tell most, once it is known."""
+    """(label, value) of the plane that would lower the deviation most, once it is known."""
     if not record["is_verified"]:
         return []
     plane = record["suggested_plane"]

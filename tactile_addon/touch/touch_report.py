@@ -168,7 +168,7 @@ def judgment(result: core.Reconstruction, mean: float, ended: str, few_facets: b
 
 
 def suggestion_report(result: core.Reconstruction, reference: Array) -> SuggestedPlane:
-    """The plane that would tell most, with an azimuth like those of the planes, and what it would bring."""
+    """The plane that would lower the mean deviation most, its azimuth as of planes, and that deviation."""
     e1, outward = reference[:, 0], reference[:, 1]
     plane, expected = core.suggest_plane(result, outward, e1)
     return {

@@ -90,7 +90,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
     def _shrink(self, context: bpy.types.Context, center: Vector, reach: float) -> Callable[[Vector], bool]:
         """Makes the balls smaller if the patch is small in the view, so that they do not hide it.
 
-        Returns a function that tells whether a place is apart from the center in the view.
+        Returns a function that is true where a place is apart from the center in the view.
         """
 
         def seen(place: Vector) -> Any:
