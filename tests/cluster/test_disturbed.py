@@ -410,7 +410,7 @@ def test_a_second_run_in_the_same_folder_is_refused_until_the_first_has_ended(
     assert rows_of(tmp_path) == rows_of(plain) and nothing_is_aside(tmp_path)
 
 
-def test_a_name_that_is_not_utf_8_costs_its_file_alone(command, objects, tmp_path):
+def test_a_name_that_is_not_utf_8_costs_only_its_file(command, objects, tmp_path):
     (tmp_path / "objects").mkdir()
     for name in (b"good.ply", b"caf\xe9.ply"):
         with open(os.fsencode(tmp_path / "objects") + b"/" + name, "wb") as file:

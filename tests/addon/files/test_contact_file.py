@@ -89,7 +89,7 @@ def test_the_unit_is_in_the_columns(read, header, unit):
     assert points(contours) == WANTED.tolist()
 
 
-def test_curves_named_strokes_run_beside_the_point(contact_file, read, tmp_path):
+def test_curves_named_strokes_do_not_pass_through_the_point(contact_file, read, tmp_path):
     text = PLAIN.replace("\n2,", "\nStroke 7,")
     assert points(read(text)[0]) == [WANTED[0].tolist()]
     found = contact_file.read(tmp_path / "contacts.csv")

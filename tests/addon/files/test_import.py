@@ -122,7 +122,7 @@ def wiped(extension, path, marked, noise=0.02, also=()):
 
 
 @pytest.mark.parametrize("marked", [True, False])
-def test_strokes_alone_become_a_patch_around_a_place(extension, empty, tmp_path, marked):
+def test_strokes_without_contours_become_a_patch_around_a_place(extension, empty, tmp_path, marked):
     path = wiped(extension, tmp_path / "wiped.csv", marked)
     options = {"point": list(SURFACE.point + 0.3), "noise": 0.02, **({} if marked else {"strokes": True})}
     patch, report = imported(empty, path, **options)
@@ -149,7 +149,7 @@ def test_without_a_place_it_is_the_mean_of_the_strokes(extension, empty, tmp_pat
     assert report["frame"]["origin"] == pytest.approx(SURFACE.point, abs=2.0)
 
 
-def test_strokes_beside_contours_are_fitted_and_go_out_again(extension, empty, tmp_path):
+def test_strokes_with_contours_are_fitted_and_go_out_again(extension, empty, tmp_path):
     path = wiped(extension, tmp_path / "both.csv", True, also=contours_of(SURFACE))
     _, report = imported(empty, path, point=list(SURFACE.point))
     assert (report["curves"], report["strokes"]) == (3, 12)

@@ -97,7 +97,7 @@ def test_one_patch_of_files_with_points_of_their_own_is_still_refused(empty, thr
         empty.ops.tactile.import_contacts(directory=str(three_files[0].parent), files=files)
 
 
-def test_where_no_normals_were_measured_the_outer_side_is_asked_for(empty, two_halves):
+def test_where_no_normals_were_measured_the_outer_side_is_required(empty, two_halves):
     before = datablocks(empty)
     with pytest.raises(
         RuntimeError, match="Outward: expected a direction where contacts have no normals and do not close"

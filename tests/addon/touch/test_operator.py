@@ -523,7 +523,7 @@ def test_bad_input_gets_a_sentence_and_leaves_nothing(empty, ball, spoil, change
     assert datablocks(empty) == before
 
 
-def test_a_name_of_two_lines_is_told_in_one(empty, ball):
+def test_a_name_of_two_lines_is_reported_in_one(empty, ball):
     ball.name = "two\nlines"
     with pytest.raises(RuntimeError, match='away from "two lines", farther than'):
         empty.ops.tactile.reconstruct(target=ball.name, location=(0.0, 0.0, 9.0), extent=0.6)

@@ -69,7 +69,7 @@ def test_what_the_mesh_hides_does_not_count(empty, ball):
     assert record["deviation_max"] < 0.01
 
 
-def test_what_touches_bridge_is_told(empty, extension, ball, touches_of):
+def test_what_touches_bridge_is_reported(empty, extension, ball, touches_of):
     """A dent next to the surface, which is made after the touches, because these would feel it."""
     touches = touches_of(ball, tolerance=0.02)
     for _ in touches.steps():
@@ -193,7 +193,7 @@ def test_once_stopped_it_touches_no_more(balls, touches_of, word):
     assert len(touches.found) == len(touches.whole.atlas.patches)
 
 
-def test_who_stops_it_is_not_told_to_allow_more_touches(ball, touches_of):
+def test_who_stops_it_gets_no_advice_to_allow_more_touches(ball, touches_of):
     touches = touches_of(ball, tolerance=0.02)
     for _ in touches.steps():
         if touches.done >= 3:

@@ -471,7 +471,7 @@ def test_a_height_at_the_origin_that_is_open_varies_with_the_terms():
     assert some.height_covariance(points, points) == pytest.approx(wanted)
 
 
-def test_a_stack_whose_touches_settle_one_after_the_other_gives_what_each_gives_alone():
+def test_a_stack_whose_touches_settle_one_after_the_other_gives_what_single_fits_give():
     s = surfaces.torus(40, 20, 0.6)
     clean = s.track(THREE, noise=0.02, rng=0)
     points = clean[1].points.copy()

@@ -75,7 +75,7 @@ def test_kernels_are_materns_of_each_length(monkeypatch, lengths):
 
 
 @pytest.mark.parametrize("weight", [1.0, 0.3])
-def test_the_mean_alone_is_that_of_the_posterior(weight):
+def test_the_mean_by_itself_is_that_of_the_posterior(weight):
     flat = np.vstack([np.outer(REACHES[::2], [np.cos(a), np.sin(a)]) for a in np.radians([0, 60, 120])])
     contacts = np.column_stack([flat, rough(3)(flat)])
     weights = np.where(np.arange(len(flat)) % 5, 1.0, weight)
@@ -205,7 +205,7 @@ def test_exact_surfaces_ask_for_none(surface, noise):
     assert r.height(x, y) == pytest.approx(surface.fit(contours, degree=6).patch.height(x, y), abs=1e-9)
 
 
-def test_white_noise_that_nobody_told_of_is_no_process():
+def test_white_noise_of_unknown_deviation_is_no_process():
     s, sizes = surfaces.sphere(25), []
     for seed in range(10):
         contours = s.track(surfaces.UPRIGHT, extent=EXTENT, step=1.0, noise=0.1, rng=seed)
@@ -248,7 +248,7 @@ def test_it_moves_with_its_contacts(scale):
     )
 
 
-def test_a_stack_of_rough_and_smooth_touches_gives_what_each_gives_alone():
+def test_a_stack_of_rough_and_smooth_touches_gives_what_single_fits_give():
     smooth = surfaces.graph({(2, 0): -0.01, (0, 2): 0.0075})
     exact = smooth.track(surfaces.UPRIGHT, extent=EXTENT, step=1.5)
     touches = [
@@ -382,6 +382,6 @@ def test_the_factor_of_places_is_that_of_their_covariance():
     assert np.array_equal(factor, np.tril(factor))
 
 
-def test_contacts_beside_a_process_are_known_to_five_ten_thousandths_of_the_radius_at_best():
+def test_contacts_with_a_process_are_known_to_five_ten_thousandths_of_the_radius_at_best():
     noises = [float(touched(seed)[1].posterior.noise) for seed in range(6)]
     assert 5e-4 <= min(noises) < 1e-3

@@ -58,7 +58,7 @@ def test_a_fit_is_the_same_in_any_order(count, curves, strokes, seed):
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("strokes", [8, 40])
-def test_strokes_alone_are_the_same_in_any_order(strokes, seed):
+def test_strokes_without_contours_are_the_same_in_any_order(strokes, seed):
     _, rows = touched(20, 3, strokes, seed)
     one = fitted([], rows)
     require_same(one, fitted([], [points[::-1] for points in rows]))

@@ -62,7 +62,7 @@ def fitted(name, points, shift=(0.0, 0.0, 0.0), **options):
 
 @pytest.mark.parametrize("name", SURFACES)
 @pytest.mark.parametrize("rows", [0, 9])
-def test_strokes_alone_show_an_exact_surface(name, rows):
+def test_strokes_without_contours_show_an_exact_surface(name, rows):
     surface = SURFACES[name]
     r = fitted(name, wiped(name, 600, rows))
     assert r.status == "ok"
@@ -84,7 +84,7 @@ def test_the_error_falls_as_the_square_of_the_extent_to_what_no_polynomial_tells
 
 @pytest.mark.parametrize("rows", [0, 9])
 @pytest.mark.parametrize(("count", "share"), [(150, 0.002), (150, 0.02), (3000, 0.002), (3000, 0.02)])
-def test_intervals_of_strokes_alone_hold_and_rows_do_not_bias(count, rows, share):
+def test_intervals_of_strokes_hold_and_rows_do_not_bias(count, rows, share):
     within, steepness = [], []
     for name, surface in SURFACES.items():
         for seed in range(4):
@@ -109,7 +109,7 @@ def test_dense_strokes_are_better_than_some_of_them(share):
 
 
 @pytest.mark.parametrize("count", [300, 3000])
-def test_beside_contours_strokes_bring_the_patch_nearer(count):
+def test_with_contours_strokes_bring_the_patch_nearer(count):
     with_strokes, without, within = [], [], []
     for name, surface in SURFACES.items():
         for seed in range(3):
@@ -126,7 +126,7 @@ def test_beside_contours_strokes_bring_the_patch_nearer(count):
     assert np.mean(within) >= 0.8
 
 
-def test_beside_contours_the_point_l_and_domain_are_theirs_and_far_strokes_are_ignored():
+def test_with_contours_the_point_l_and_domain_are_theirs_and_far_strokes_are_ignored():
     surface, contours = SURFACES["pear"], crossed("pear")
     far = wiped("pear", 400, 0, 30.0)
     far = far[np.linalg.norm(far - surface.point, axis=1) > 15.0]
@@ -175,7 +175,7 @@ def test_all_that_tells_of_the_deviation_agrees():
     assert np.sqrt(variances) == pytest.approx(r.height_std(*(r.radius * flat).T) / r.radius)
 
 
-def test_the_radius_limits_the_contacts_of_strokes_alone():
+def test_without_contours_the_radius_limits_the_contacts_of_strokes():
     points = np.vstack([wiped("saddle", 600, 9), SURFACES["saddle"].point + np.array([300.0, 0.0, 50.0])])
     r = fitted("saddle", points, radius=6.0)
     assert 5.0 < r.radius <= 6.0

@@ -67,7 +67,7 @@ def test_a_flat_face_between_sharp_edges_is_the_shape():
     assert not has_few(Prism([(-1.0, 0.0), (-0.3, 0.0), (0.2, 0.0), (1.0, 0.0)]), 0.5)
 
 
-def test_a_flat_face_beside_a_fillet_is_the_shape():
+def test_a_flat_face_next_to_a_fillet_is_the_shape():
     round_ = [
         (1.0 + 0.05 * math.sin(a), -0.05 + 0.05 * math.cos(a)) for a in np.radians(np.arange(0, 100, 18))
     ]
