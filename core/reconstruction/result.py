@@ -127,7 +127,7 @@ class Reconstruction:
         return self.geometry.height(x, y)
 
     def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Standard deviation of the height at local (x, y), in their shape, including blind directions."""
+        """Standard deviation of the height at local (x, y), in their shape, with what contacts do not show."""
         points = np.column_stack([np.ravel(v) for v in np.broadcast_arrays(x, y)])
         outward = np.ones(len(points))
         if self.posterior.amplitude:  # Otherwise it makes no difference.
@@ -221,14 +221,14 @@ class Reconstruction:
         return math.sqrt(variance) / self.radius**2
 
     @cached_property
-    def blind(self) -> int:
+    def null_space_dimension(self) -> int:
         """Number of directions among the coefficients of degree 1 to d that the contacts do not show."""
         return self.posterior.null_space_dimension(self.patch.degree)
 
     @property
-    def blind_share(self) -> float:
-        """The share of the coefficients that `blind` counts."""
-        return self.blind / terms_to(self.patch.degree)
+    def null_space_share(self) -> float:
+        """`null_space_dimension` as a share of the number of these coefficients."""
+        return self.null_space_dimension / terms_to(self.patch.degree)
 
     @cached_property
     def _departures(self) -> Array:
@@ -296,7 +296,7 @@ class Reconstruction:
 
     @property
     def message(self) -> str:
-        """The status in a sentence with advice, and whether directions are undefined or blind."""
+        """The status in a sentence with advice, and what the contacts leave undetermined."""
         return self._verdict[1] + notes(self)
 
     @cached_property

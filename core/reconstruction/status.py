@@ -107,9 +107,9 @@ def notes(r: Judged) -> str:
         message += f" {r.taps.missed} of {r.taps.number} taps between the curves feel no surface."
     if r.posterior.is_round:
         message += " The two curvatures are equal within their error, so there are no principal directions."
-    if r.blind:
+    if r.null_space_dimension:
         terms = terms_to(r.patch.degree)
-        message += f" These planes cannot show {r.blind} of the {terms} shape terms."
+        message += f" These planes cannot show {r.null_space_dimension} of the {terms} shape terms."
     return message
 
 

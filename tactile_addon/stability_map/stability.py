@@ -175,7 +175,7 @@ class StabilityMap:
             result.mean_height_std,
             touch.extent,
             result.condition_number,
-            result.blind_share,
+            result.null_space_share,
         )
 
     def report(self) -> dict[str, Any]:

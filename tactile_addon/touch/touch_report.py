@@ -215,5 +215,5 @@ def reconstruction_report(
         "contacts": len(result.contacts),
         "fit_error": result.fit_error,
         "height_std": result.mean_height_std,
-        "blind": result.blind,
+        "blind": result.null_space_dimension,
     }

@@ -58,7 +58,7 @@ def test_a_monkey_saddle_hidden_from_its_planes_shows_in_normals(noise, std):
     contours = touched(HIDDEN, noise)
     fits = (HIDDEN.fit(c, degree=4) for c in (contours, measured(contours, std)))
     without, with_normals = fits
-    assert (without.blind, with_normals.blind) == (3, 0)
+    assert (without.null_space_dimension, with_normals.null_space_dimension) == (3, 0)
     assert "cannot show" not in with_normals.message
     assert surfaces.off_data(HIDDEN, with_normals) < 0.1 * surfaces.off_data(HIDDEN, without)
 

@@ -129,8 +129,8 @@ def examine(r):
     x, y = np.vstack([r.domain.grid(100)[0], r.domain.boundary(12), points[:, :2]]).T
     patch = r.patch
     numbers = [
-        *(r.radius, r.noise, r.mean_height_std, r.blind, r.fit_error, r.total_absolute_curvature),
-        *(r.condition_number, patch.k1, patch.k2, r.domain.area),
+        *(r.radius, r.noise, r.mean_height_std, r.fit_error, r.total_absolute_curvature),
+        *(r.null_space_dimension, r.condition_number, patch.k1, patch.k2, r.domain.area),
     ]
     arrays = [
         *(r.frame.origin, r.frame.axes, r.contacts, r.domain.ends, patch.coefficients, numbers, x, y),

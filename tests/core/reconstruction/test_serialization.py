@@ -42,9 +42,9 @@ def test_through_json_and_back_it_is_the_same_to_the_last_bit(r):
     for one, other in zip(again.contours, r.contours, strict=True):
         for key, value in vars(one).items():
             assert np.array_equal(value, vars(other)[key]), key
-    for name in ("method", "status", "message", "blind", "radius", "converged", "mean_height_std"):
+    for name in ("method", "status", "message", "radius", "converged", "mean_height_std"):
         assert getattr(again, name) == getattr(r, name)
-    for name in ("fit_error", "total_absolute_curvature", "condition_number"):
+    for name in ("null_space_dimension", "fit_error", "total_absolute_curvature", "condition_number"):
         assert getattr(again, name) == getattr(r, name)
     assert suggest_plane(again) == suggest_plane(r)
 

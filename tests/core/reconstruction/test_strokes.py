@@ -140,7 +140,7 @@ def test_with_contours_the_point_l_and_domain_are_theirs_and_far_strokes_are_ign
     assert r.domain.boundary(40) == pytest.approx(plain.domain.boundary(40), abs=0.02 * EXTENT)
     assert len(r.contacts) == len(plain.contacts) + len(r.strokes)
     # Three planes leave directions open that strokes show.
-    assert plain.blind > 0 == r.blind
+    assert plain.null_space_dimension > 0 == r.null_space_dimension
 
 
 def test_the_origin_is_the_foot_of_the_place():
