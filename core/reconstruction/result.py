@@ -127,7 +127,7 @@ class Reconstruction:
         return self.geometry.height(x, y)
 
     def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Standard deviation of the height at local (x, y), in their shape, with what contacts do not show."""
+        """Standard deviation of the height at local (x, y), in their shape, with what contacts leave open."""
         points = np.column_stack([np.ravel(v) for v in np.broadcast_arrays(x, y)])
         outward = np.ones(len(points))
         if self.posterior.amplitude:  # Otherwise it makes no difference.
