@@ -42,10 +42,10 @@ from .atlas_shapes import (
 
 NOISE = 0.0005
 PLACES = 1000  # This many places are judged around each scan, and as many above felt area.
-ABOVE = 0.1  # The largest height of these above it.
+ABOVE = 0.1  # These are at most so far above it.
 SURE = 5.0
-GAP = 0.01  # A tenth of the distance between two balls.
-GAPS = (0.03, 0.06)  # The least and the largest distance between the strokes of a scan.
+GAP = 0.01  # Two balls are ten times as far from each other.
+GAPS = (0.03, 0.06)  # The strokes of a scan are so far apart, at least and at most.
 FINE = 0.5  # Contacts along a stroke are this share of the gap apart.
 OBJECTS = {
     "ball": lambda: revolved(arc(1.0, 0.0, 0.0, np.pi)),

@@ -127,7 +127,7 @@ def test_touches_that_choose_their_extent_are_those_of_the_other_operator(empty,
 
 
 def test_an_automatic_extent_fits_the_place(empty, ridge):
-    """The extent is long off a ridge and short on it, so fewer patches are in doubt."""
+    """The extent is long beside a ridge and short on it, so fewer patches are in doubt."""
     painted, record = stability_map(empty, target=ridge.name, spacing=0.1)
     fixed, given = stability_map(empty, target=ridge.name, spacing=0.1, extent=0.5)
     assert (record["extent"], record["step"]) == (0.0, 0.0)
@@ -483,8 +483,8 @@ def test_a_probe_finds_the_patches_of_a_map(empty, vase, extension):
     assert touched.sum() == record["touched"] > 15
     for vertex in np.flatnonzero(touched).tolist():
         place = painted.matrix_world @ painted.data.vertices[vertex].co
-        above = place + 0.02 * painted.data.vertices[vertex].normal
-        assert np.allclose(touched_near(painted, above), place)
+        beside = place + 0.02 * painted.data.vertices[vertex].normal
+        assert np.allclose(touched_near(painted, beside), place)
         if reasons[vertex] == PATCH:
             empty.context.view_layer.objects.active = painted
             assert empty.ops.tactile.pick(target="Vase", location=place, new=True) == {"FINISHED"}
