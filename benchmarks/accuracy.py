@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How near the fits come to surfaces known exactly, beside what people would use instead.
+"""How near the fits come to surfaces known exactly, compared with what people would use instead.
 
 `python -m benchmarks.accuracy`, from the root of a checkout. The Gaussian process needs scikit-learn, and is
 left out where that is missing. The command prints Markdown tables for
@@ -231,11 +231,11 @@ METHODS = {
     "quadratic variation, weight 1e5": partial(ours, method="quadratic-variation"),
     "TAGC, weight 1e3": partial(ours, method="tagc"),
     "least squares": partial(ours, method="least-squares"),
-    "quadric alone": partial(ours, method="least-squares", degree=2),
+    "quadric": partial(ours, method="least-squares", degree=2),
     "jet of degree 3": partial(jet, degree=3),
     "jet of degree 4": partial(jet, degree=4),
 }
-BAYES, PROCESS, QUADRIC = next(iter(METHODS)), "Matérn 5/2 Gaussian process", "quadric alone"
+BAYES, PROCESS, QUADRIC = next(iter(METHODS)), "Matérn 5/2 Gaussian process", "quadric"
 CUBIC, TAGC = (next(m for m in METHODS if m.startswith(name)) for name in ("RBF cubic", "TAGC"))
 if find_spec("sklearn") is None:
     del METHODS[PROCESS]
@@ -338,11 +338,11 @@ def median_score(scores, measure, method, planes, noise):
 def error_table(scores, times):
     def row(method):
         errors = np.array([s[method].error for s in scores.values()])
-        alone = np.array([s[QUADRIC].error for s in scores.values()])
+        quadric = np.array([s[QUADRIC].error for s in scores.values()])
         mean = np.mean([
             np.mean([s[method].error for k, s in scores.items() if k[1:3] == cell]) for cell in CELLS
         ])  # fmt: skip
-        worst = np.max((errors - 2.0) / np.maximum(alone, 1e-9)) if method != QUADRIC else 1.0
+        worst = np.max((errors - 2.0) / np.maximum(quadric, 1e-9)) if method != QUADRIC else 1.0
         return [
             method,
             *(f"{median_score(scores, 'error', method, *cell):.0f}" for cell in CELLS),
@@ -353,10 +353,10 @@ def error_table(scores, times):
 
     print("(a) Exact surfaces: the mean |dz| in um, averaged over seeds, as medians over the surfaces, for")
     print("noise of 0, 0.02 and 0.1 mm. `mean` is over all surfaces, plane sets and noises alike. `worst` is")
-    print("the error less 2 um over that of the quadric alone, in the worst case.\n")
+    print("the error less 2 um over that of the quadric, in the worst case.\n")
     head = ["method", *(f"{p}, {n:g}" for p, n in CELLS), "mean", "worst", "fit, ms", "and hold-out"]
     limit = [f"{median_of(scores, lambda s: s['limit'], *cell):.0f}" for cell in CELLS]
-    table(head, [*(row(m) for m in METHODS), ["five terms through the noise alone", *limit, "", "", "", ""]])
+    table(head, [*(row(m) for m in METHODS), ["five terms fitted to the noise", *limit, "", "", "", ""]])
 
 
 def frame_table(scores):

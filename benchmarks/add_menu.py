@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender's Add menu has, touched all over with the dialog's defaults, beside the result.
+"""The meshes of Blender's Add menu, touched all over with the dialog's defaults.
 
 `python -m benchmarks.add_menu ZIP [--only NAME]`, from the root of a checkout; ZIP is the built extension.
 It prints a Markdown table and draws build/charts/add_menu.jpg, objects above and what was felt of them below.
@@ -25,7 +25,7 @@ from tools import blender, demo
 
 from . import ROOT, SCANS_FOLDER, machine, table
 
-APART, SIZE = 1.1, 1.05  # Objects are so far apart in the picture, and their diagonal is so long.
+APART, SIZE = 1.1, 1.05  # The distance of objects in the picture, and the length of their diagonals.
 COLUMNS, WIDTH, SAMPLES = 6, 1800, 48
 TINTS = ((0.35, 0.35, 0.34, 1.0), (0.16, 0.3, 0.5, 1.0))  # Of objects, and of what was felt of them.
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whole objects: how far the surface of all touches is off, after how many touches and seconds, beside peers.
+"""Whole objects: the error, touches and seconds of the surface of all touches, compared with peers.
 
 `python -m benchmarks.atlas [--only NAME] [--finest T] [--coarsest T] [--peers NAME]`, from the root of a
 checkout. It needs bpy to read the scans and to cast rays, and pymeshlab for three of the peers. Each object
@@ -9,11 +9,11 @@ Markdown tables; with --redraw it only draws docs/charts/atlas.csv again:
 
 (a) each object at five tolerances: the numbers of touches and contacts, and CPU seconds; the distances of
     points of the object from the mesh, and the share of these points that the field's 90 % interval holds;
-    along the edges of the graph the angle between the normals of the two patches, also at those points
-    alone around which the object turns by less than 20 degrees, with their share; by how much the joined
+    along the edges of the graph the angle between the normals of the two patches, once more at only those
+    points around which the object turns by less than 20 degrees, with their share; by how much the joined
     surface and the object turn from .001 on one side of an edge to .001 on the other; the share of points
     where K is alike within 90 %; and the topology of the mesh;
-(b) at tolerance .001 the CPU seconds of 100 touches with join and mesh, beside those of 100 automatic touches
+(b) at tolerance .001 the CPU seconds of 100 touches with join and mesh, and those of 100 automatic touches
     (explore_many with its defaults) at the same places in one batch;
 (c) peers on the contacts of tolerance .001 with the same normals, each at the best of its settings, and the
     atlas and Poisson where normals are off by ten degrees;
@@ -53,7 +53,7 @@ COMPARED, POINTS, MOST = 0.001, 2500, 1500
 FINE = 0.0002  # With this tolerance and noise 1000 touches are not enough.
 BLURRED = np.radians(10.0)  # The root mean square angle by which blurred normals are off.
 CREASE, WITHIN = 20.0, 0.01  # There is a crease where the object turns by more degrees within this length.
-BESIDE = 0.001  # The distance from the edge of two patches at which normals are compared, on both sides.
+ACROSS = 0.001  # The distance from the edge of two patches at which normals are compared, on both sides.
 AROUND = 8  # The number of places on a ring of radius WITHIN where normals are compared.
 
 
@@ -87,7 +87,7 @@ def turns(points, normals):
 
 def turns_across(points, ways, normals):
     """By how many degrees normals turn from one side of points (n, 3) to the other, along ways (n, 3)."""
-    cosines = np.einsum("ni,ni->n", *(normals(points + side * BESIDE * ways) for side in (-1.0, 1.0)))
+    cosines = np.einsum("ni,ni->n", *(normals(points + side * ACROSS * ways) for side in (-1.0, 1.0)))
     return np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
 
 

@@ -35,7 +35,7 @@ TOLERANCES = (0.002, 0.008)
 THINNEST = 10.0  # Objects are touched with a tolerance if no wall is thinner than this many of it.
 GAP = 10.0  # Two balls are this many tolerances from each other.
 SECTIONS = 128  # Round objects have this many facets around their axis.
-# Balls have more: 128 facets are as far off a ball as a patch is uncertain, and finer than its knots.
+# Balls have more: 128 facets are off a ball by the deviation of a patch, and finer than its knots.
 BALL_SECTIONS = 256
 FILLET = 12  # A fillet has this many facets across.
 SHELLS = 160  # The hollow ball is touched at this many places.
@@ -145,7 +145,7 @@ def angle(long, wide, depth):
 
 
 def tee(stem, long, width, high, depth):
-    """A T: a bar of this width and height on a stem that is so wide and long."""
+    """A T: a bar of this width and height on a stem of this width and length."""
     s, w, top = 0.5 * stem, 0.5 * width, long + high
     polygon = [(-s, 0), (s, 0), (s, long), (w, long), (w, top), (-w, top), (-w, long), (-s, long)]
     cap = [(0, 1, 2), (0, 2, 7), (2, 3, 4), (2, 4, 5), (2, 5, 7), (7, 5, 6)]

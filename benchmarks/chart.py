@@ -111,7 +111,7 @@ METHODS = [
     *_powers("desc.", "tagc", (1e2, 1e3, 1e4), "the same by steepest descent", solver="descent"),
     *_powers("QV", "quadratic-variation", (1e3, 1e5), "quadratic variation, weight"),
     _paper("LS", "least squares, degree 4", "least-squares"),
-    _paper("quadric", "frame and curvatures alone", "least-squares", degree=2),
+    _paper("quadric", "frame and curvatures only", "least-squares", degree=2),
     *(_peer(label, INTERPOLATION, f"scipy, {name[4:]}, {accuracy.settings(accuracy.SPLINES[name])}",
             peers.radial_basis, **accuracy.SPLINES[name])
       for label, name in (("RBF tp", "RBF thin plate"), ("RBF cubic", "RBF cubic"))),
@@ -121,7 +121,7 @@ METHODS = [
     _peer("GP RBF", PROCESSES, "squared exponential", peers.gaussian_process, "sklearn", nu=np.inf),
     _peer("spline", SPLINES, "scipy, SmoothBivariateSpline", peers.smoothing_spline),
     _peer("NURBS", SPLINES, "geomdl, rings by half curves", peers.nurbs, "geomdl"),
-    _peer("Poisson+n", MESHES, "pymeshlab, told the true normals", peers.screened_poisson, "pymeshlab",
+    _peer("Poisson+n", MESHES, "pymeshlab, with the true normals", peers.screened_poisson, "pymeshlab",
           true_normals=True),
     _peer("Poisson", MESHES, "normals estimated from the contacts", peers.screened_poisson, "pymeshlab",
           true_normals=False),

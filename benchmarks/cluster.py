@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Data sets of touches: what they cost beside plain loops, and how many workers they can keep busy.
+"""Data sets of touches: what they cost compared with plain loops, and how many workers they can keep busy.
 
 `python -m benchmarks.cluster [--quick]`, from the root of a checkout with cluster/requirements.txt installed.
 It prints Markdown tables:
 
-(a) touches a second by one worker and by two, beside one and two plain loops over as many touches
+(a) touches a second by one worker and by two, and by one and two plain loops over as many touches
     (plain_loop.py); both take turns, and the table has medians. `processor` is the processor time of the
     plain loops over that of all processes of the cluster, which other programs hardly change;
-(b) what a block costs beside its touches, on the worker and at the scheduler;
+(b) what a block costs in addition to its touches, on the worker and at the scheduler;
 (c) the memory of all processes while 1000 objects are touched by processes that are never replaced;
 (d) the share of the workers' time that goes into touches, computed from (a) and (b).
 """
@@ -76,23 +76,23 @@ def clocked(spent):
     spent.append((seconds, sum(work.values()), work[own]))
 
 
-def made(engine, files, asked):
+def made(engine, files, settings):
     """Makes a data set with warm workers: (seconds, processor time, that of client and scheduler)."""
     spent = []
     with tempfile.TemporaryDirectory() as folder:
-        run = Run(DataSet(Path(folder)), asked, [str(path) for path in files])
+        run = Run(DataSet(Path(folder)), settings, [str(path) for path in files])
         with clocked(spent):
             run.work(engine)
     return spent[0]
 
 
-def looped(files, asked, count):
+def looped(files, settings, count):
     """(seconds, processor time) of `count` plain loops side by side, each over all files."""
     words = [[path.stem, str(path)] for path in files]
     command = [sys.executable, "-m", "benchmarks.plain_loop", json.dumps(words)]
     loops = [
         subprocess.Popen(
-            [*command, json.dumps(options(**asked | {"seed": seed}).to_dict())],
+            [*command, json.dumps(options(**settings | {"seed": seed}).to_dict())],
             cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
         )
         for seed in range(count)
@@ -151,7 +151,7 @@ def overhead(files, count):
     opening = looped(files, {"touches": 1, "block": 1, **fixed}, 1)[1] / len(files) - touches / count
     worker, center = (work - central - touches) / count, central / count
     idle = max(seconds - work, 0.0) / count
-    print(f"(b) What a block costs beside its touches, from {count} blocks of one touch.\n")
+    print(f"(b) What a block costs in addition to its touches, from {count} blocks of one touch.\n")
     rows = [["worker, processor time", worker], ["opening another object, processor time", opening]]
     rows.append(["client and scheduler, processor time", center])
     rows.append(["clock beyond all processor time, as where other programs run", idle])

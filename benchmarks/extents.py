@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a patch reaches by itself, beside fixed extents.
+"""How far a patch with an automatic extent reaches, compared with fixed extents.
 
 `python -m benchmarks.extents ZIP [--touches N | --pictures]`, from the root of a checkout; ZIP is the built
 extension. With --pictures it draws build/paper/extent.jpg instead.

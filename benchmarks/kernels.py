@@ -154,7 +154,7 @@ def patches_table(title, runs):
         off = np.array([difference(*pair) for pair in zip(runs[first], runs[kernel], strict=True)])
         most, stds = off.max(axis=0)
         rows.append([kernel, f"{most:.1e}", f"{stds:.1e}", f"{np.sum(off[:, 0] > AGREES)} of {len(off)}"])
-    table([f"beside {first}", "radii", "deviations", f"off by more than {AGREES:g} radii"], rows)
+    table([f"compared with {first}", "radii", "deviations", f"off by more than {AGREES:g} radii"], rows)
 
 
 def objects_table(runs):

@@ -3,8 +3,8 @@
 """Where the time goes when a probe follows the mouse: one live update, on a small and on a large mesh.
 
 `python -m benchmarks.live ZIP [--base ROOT]`, from the root of a checkout; ZIP is the built extension. With
---base it prints instead how much processor time a live update and the end of a gesture take beside those of
-that checkout, whose extension must be built too; the two take turns (live_worker.py).
+--base it prints instead how much processor time a live update and the end of a gesture take here and in that
+checkout, whose extension must be built too; the two take turns (live_worker.py).
 
 A wavy sheet is touched once, so that Blender builds its tree of the faces. Then the first plane is turned by
 a degree again and again, as dragging its handle does. The Markdown table has medians in milliseconds on one

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a larger mesh costs: a touch against the number of faces, beside sections of the whole mesh.
+"""What a larger mesh costs: touches and sections of the whole mesh against the number of faces.
 
 `python -m benchmarks.mesh_size ZIP [--quick]`, from the root of a checkout; ZIP is the built extension.
 Prints Markdown tables, times in milliseconds, and draws build/charts/mesh_size.png.
@@ -60,7 +60,7 @@ CAPTION = (
 
 
 class Recorder:
-    """A surface that keeps the rays it is asked for."""
+    """A surface that keeps the rays that are cast on it."""
 
     def __init__(self, surface):
         self.surface, self.rays = surface, []

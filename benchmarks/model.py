@@ -4,8 +4,8 @@
 
 `python -m benchmarks.model --base ROOT [--robot FOLDER] [--size N] [TASK ...]`, from the root of a checkout;
 ROOT is a worktree of this repository before the change, FOLDER a copy of
-github.com/vu-arma-dev/robot-palpation-data. Both checkouts are asked for the same touches (model_worker.py),
-by two processes at once. The command prints Markdown tables of means:
+github.com/vu-arma-dev/robot-palpation-data. Both checkouts make the same touches (model_worker.py), in two
+processes at once. The command prints Markdown tables of means:
 
 (a) errors, scores and shares of the 90 % intervals, on exact and random surfaces (um), on scans (permille of
     the radius, real.py), there with measured normals too, and of the robot's contacts (mm); `+-` is the

@@ -80,7 +80,7 @@ def with_normals(contour, std, rng):
 
 
 def palpated(folder, points):
-    """The robot's strokes alone, and three curves cut out of them."""
+    """The robot's strokes, and three curves cut out of them."""
     rows = []
     for _, contacts, directions in robot.explorations(folder):
         for place in robot.places(contacts, directions, points, RADIUS):

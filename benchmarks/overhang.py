@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much of a patch has nothing below it, as beside edges, holes and corners that no curve crosses.
+"""How much of a patch has nothing below it, as next to edges, holes and corners that no curve crosses.
 
 `python -m benchmarks.overhang ZIP [--touches N]`, from the root of a checkout; ZIP is the built extension.
 A machined block and a plate with a hole are touched at random points (seeded, by area) with three planes.
@@ -35,9 +35,9 @@ def main():
         for name, make in (("machined block", _block), ("plate with a hole", _plate)):
             for share in EXTENTS:
                 shares = _shares(extension, make(extension), share, options.touches)
-                told = f"1/{1.0 / share:.0f}" if share else "automatic"
+                extent = f"1/{1.0 / share:.0f}" if share else "automatic"
                 numbers = [shares.mean(), *np.quantile(shares, [0.5, 0.95]), shares.max()]
-                rows.append([f"{name}, {told}", str(len(shares)), *(f"{100.0 * v:.1f} %" for v in numbers)])
+                rows.append([f"{name}, {extent}", str(len(shares)), *(f"{100.0 * v:.1f} %" for v in numbers)])
     table(["object, extent of the size", "patches", "nothing below, mean", "median", "95 %", "most"], rows)
     print(f"{options.touches} touches a row; {machine('bpy', 'numpy', 'scipy')}.")
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The experiments of Jia and Tian's sections IV and V again, beside their figures.
+"""The experiments of Jia and Tian's sections IV and V again, with the paper's figures for comparison.
 
 `python -m benchmarks.paper ZIP`, from the root of a checkout; ZIP is the built extension. Blender, with it
 installed, reads the scans and draws the pictures. The command prints Markdown:
@@ -133,7 +133,7 @@ def exact_places():
 
 
 def scan_places(extension):
-    """Yields a Place on each scan of an object of the paper's kind, in mm; the scan is alone in the scene."""
+    """Yields a Place on each scan of an object of the paper's kind, in mm; the scene has nothing else."""
     import bpy
     from mathutils import Matrix
 
@@ -166,7 +166,7 @@ class Tested(NamedTuple):
     kind: str
     row: Row
     milliseconds: dict
-    shorter: Row  # TAGC alone, at a shorter extent.
+    shorter: Row  # Only TAGC, at a shorter extent.
     alike: Row  # TAGC and QV, both with TAGC's weight.
 
 

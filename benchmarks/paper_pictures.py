@@ -117,7 +117,7 @@ class Stage:
 
 
 def draw_row(extension, place, r, contours):
-    """Draws a row of Table I: the scan, alone in the scene, and its patch from outside and from inside."""
+    """Draws a row of Table I: the scan, with nothing else in the scene, and both sides of its patch."""
     import bpy
 
     scene = bpy.context.scene

@@ -106,7 +106,7 @@ def radial_basis(case, kernel, **options):
 
 
 def moving_least_squares(case, width=0.5):
-    """A quadric for each point at which the height is asked, weighted by a Gaussian of `width`, in L.
+    """A quadric for each point at which the height is needed, weighted by a Gaussian of `width`, in L.
 
     Narrower weights would see one curve at a time, which does not determine a quadric.
     """
@@ -142,7 +142,7 @@ def jet(case, degree):
 
 
 def smoothing_spline(case, degree=2, misfit=5e-3):
-    """FITPACK's surfit, which is told the noise and a `misfit` of its own, in L.
+    """FITPACK's surfit, with the given noise and a `misfit` of its own, in L.
 
     Without the misfit it would add knots without end. The spline is quadratic, because between three lines a
     cubic one is as free as a jet.

@@ -68,7 +68,7 @@ def dark(color):
 
 
 def label(axes, texts, places):
-    """Writes texts, pairs (words, color), beside their places (n, 2), each joined to its place by a line."""
+    """Writes texts, pairs (words, color), near their places (n, 2), each joined to its place by a line."""
     line = {"arrowstyle": "-", "lw": 0.4, "shrinkA": 0, "shrinkB": 2}
     look = {"textcoords": "offset points", "ha": "center", "va": "center", "fontsize": LABEL_SIZE}
     halo = [withStroke(linewidth=1.8, foreground="white")]

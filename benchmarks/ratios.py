@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long fits and automatic touches take beside those of an older checkout and scipy's thin plate.
+"""How long fits and automatic touches take, compared with an older checkout and scipy's thin plate.
 
 `python -m benchmarks.speed --base ROOT` prints it; ROOT is any worktree of this repository. Each checkout
 runs in a process of its own on the same cases. The two take turns, so that other programs slow down both.
@@ -40,8 +40,8 @@ def compare(base, cases, tasks):
         for task, (kind, rounds) in TASKS.items():
             if task not in tasks:
                 continue
-            ask = [(ours, task), (theirs, task), *([(ours, "spline")] if task == "fit" else [])]
-            seconds = np.array([_asked(ask, i, rounds) for i in range(len(cases[kind]))])
+            timed = [(ours, task), (theirs, task), *([(ours, "spline")] if task == "fit" else [])]
+            seconds = np.array([_least_seconds(timed, i, rounds) for i in range(len(cases[kind]))])
             groups = {task: np.full(len(seconds), True)}
             if task == "fit":
                 groups = {"fit, no process": smooth, "fit, process": ~smooth}
@@ -49,9 +49,9 @@ def compare(base, cases, tasks):
     table(["medians, ms", "this", "base", "this / base", "thin plate", "this / thin plate", "cases"], rows)
 
 
-def _asked(ask, case, rounds):
-    """The least seconds of each (worker, task) of `ask` over this many rounds, in which they take turns."""
-    return np.min([[answer(each, f"{task} {case}") for each, task in ask] for _ in range(rounds)], axis=0)
+def _least_seconds(timed, case, rounds):
+    """The least seconds of each (worker, task) of `timed` over this many rounds, in which they take turns."""
+    return np.min([[answer(each, f"{task} {case}") for each, task in timed] for _ in range(rounds)], axis=0)
 
 
 def _row(title, seconds, cases, task):

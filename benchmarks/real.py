@@ -115,7 +115,7 @@ class Scan:
 
 
 class Touch(NamedTuple):
-    """A case of benchmarks.accuracy, as far as the peers need it."""
+    """The part of a case of benchmarks.accuracy that the peers need."""
 
     point: np.ndarray
     axes: np.ndarray  # The paper's frame.
@@ -164,11 +164,11 @@ def ours(touch, **values):
     return Fit(r.frame.axes, within(r.height), (r.patch.k1, r.patch.k2), within(r.height_std))
 
 
-OURS, ALONE, PROCESS = "bayes", "without process", "Matérn process on a quadric"
+OURS, SEXTIC, PROCESS = "bayes", "without process", "Matérn process on a quadric"
 # These settings were the best ones on the scans.
 METHODS = {
     OURS: ours,
-    ALONE: partial(ours, UNEXPLAINED_MISFIT=math.inf),
+    SEXTIC: partial(ours, UNEXPLAINED_MISFIT=math.inf),
     "RBF thin plate": partial(radial_basis, kernel="thin_plate_spline", smoothing=1e-3),
     "RBF cubic": partial(radial_basis, kernel="cubic", degree=2, smoothing=1e-3),
     PROCESS: quadric_process,
@@ -247,14 +247,14 @@ def fixed_row(title, of):
         *title,
         *(f"{of[method].error:.2f}" for method in METHODS),
         f"{of[OURS].error / best:.2f}",
-        *(f"{of[m].covered:.2f}" for m in (OURS, ALONE, PROCESS)),
-        *(f"{of[m].interval:.1f}" for m in (OURS, ALONE, PROCESS)),
+        *(f"{of[m].covered:.2f}" for m in (OURS, SEXTIC, PROCESS)),
+        *(f"{of[m].interval:.1f}" for m in (OURS, SEXTIC, PROCESS)),
     ]
 
 
 def fixed_tables(scores):
     """scores : {scan: {cell: {method: Score}}}"""
-    intervals = [f"{what}, {m}" for what in ("within", "score") for m in ("bayes", "alone", "process")]
+    intervals = [f"{what}, {m}" for what in ("within", "score") for m in ("bayes", "sextic", "process")]
     head = ["planes", "extent", *METHODS, "bayes / best peer", *intervals]
     cells = [(planes, extent) for extent in EXTENTS for planes in PLANES]
     rows = []
@@ -444,14 +444,14 @@ def choose_taps(scans, count):
     def worst(setting, names):
         return max(rows[setting][name][11] for name in names)
 
-    def told(setting, names):
+    def totals(setting, names):
         sums = (sum(rows[setting][name][i] for name in names) for i in (0, 4, 5, 7))
         return [*(f"{v:.0f}" for v in sums), f"{area(setting, names):.3f}", f"{worst(setting, names):.2f}"]
 
     names = [scan.name for scan in scans]
     head = ["sure", "off > 2 %", "> 5 deviations", "all areas", "share", "worst"]
     print("Each setting is judged on all scans.\n")
-    table(["setting", *head], [[s, *told(s, names)] for s in settings])
+    table(["setting", *head], [[s, *totals(s, names)] for s in settings])
     print("Each scan is judged with the setting that the others choose.\n")
     lines = []
     for left in [*([name] for name in names), []]:
@@ -460,7 +460,7 @@ def choose_taps(scans, count):
         allowed = [s for s in settings if silent(s, others) == least]
         enough = ENOUGH_AREA * max(area(s, others) for s in allowed)
         best = min((s for s in allowed if area(s, others) >= enough), key=lambda s: worst(s, others))
-        lines.append([*(left or ["none"]), best, *told(best, left or names)])
+        lines.append([*(left or ["none"]), best, *totals(best, left or names)])
     table(["left out", "chosen on the others", *head], lines, left=2)
 
 

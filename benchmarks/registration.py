@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contours whose place is unknown, put onto scans: core.register beside the paper's exhaustive search.
+"""Contours whose place is unknown, put onto scans: core.register compared with the paper's exhaustive search.
 
 `python -m benchmarks.registration`, from the root of a checkout, with the Python that `make chart` has
 prepared. At random points (seeded, by area) of each scan, scaled to 100 mm, three contours of a fifth of its
@@ -107,8 +107,8 @@ class Exhaustive:
     def places(self, contacts):
         """The KEPT best poses of all vertices and turns: axes (KEPT, 3, 3) and origins (KEPT, 3).
 
-        A pose is dropped if a few contacts alone are worse than all contacts in the last of KEPT poses. No
-        better pose is lost by that, because more contacts only add to a sum of squares.
+        A pose is dropped if a few contacts have a larger sum of squares than all contacts in the last of KEPT
+        poses. No better pose is lost by that, because more contacts only add to the sum.
         """
         turn = 2.0 * np.pi / FINE_TURNS * np.arange(FINE_TURNS)
         about = Rotation.from_rotvec(turn[:, None] * [0.0, 0.0, 1.0]).as_matrix()

@@ -146,7 +146,7 @@ PEERS = {
         for smoothing in SMOOTHINGS
     },
 }
-ALL, CROSSED, BOTH = "strokes alone", "three curves", "curves and strokes"
+ALL, CROSSED, BOTH = "only strokes", "three curves", "curves and strokes"
 
 
 def scored(at, height, height_std, given, held_out, seconds):
@@ -270,7 +270,7 @@ def main():
         errors = {m: np.mean([of[m].error for of in found]) for m in [ALL, *peers]}
         least = min(peers, key=errors.__getitem__)
         rows.append([name, str(len(found)), f"{errors[ALL]:.3f}", f"{errors[least]:.3f}", least])
-    table(["exploration", "places", "strokes alone, mm", "best peer, mm", "which"], rows)
+    table(["exploration", "places", "only strokes, mm", "best peer, mm", "which"], rows)
     balls = [found for found in balls if found is not None]
     head = ["centers are moved", "places", "mean error, mm", "median", "ms"]
     rows = []

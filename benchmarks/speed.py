@@ -3,7 +3,7 @@
 """Where the time of a fit goes, what its solvers gain, and what fitting many at once gains.
 
 `python -m benchmarks.speed [--base ROOT [TASK ...]]`, from the root of a checkout. With --base it only prints
-how long fits and automatic touches take beside those of that checkout and beside scipy's thin plate
+how long fits and automatic touches take, compared with that checkout and with scipy's thin plate
 (ratios.py, which needs bpy to read the scans and to cast rays). Otherwise it prints Markdown tables, on the
 touches of benchmarks.accuracy (eleven exact surfaces, three plane sets, three noise levels, 75 contacts):
 
@@ -134,8 +134,8 @@ def many(cases):
     runs = []
     for _ in range(RUNS):
         seconds, stacked = timed(lambda: reconstruct_many(points, contours, outward=outward, degree=4))
-        alone, single = timed(lambda: [fit(case) for case in copies])
-        runs.append((len(copies) / seconds, len(copies) / alone))
+        looped, single = timed(lambda: [fit(case) for case in copies])
+        runs.append((len(copies) / seconds, len(copies) / looped))
     off = max(_departure(a, b) for a, b in zip(stacked, single, strict=True))
     at_once, one_by_one = np.median(runs, axis=0)
     print(f"(b) {len(copies)} fits by bayes.\n")

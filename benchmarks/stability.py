@@ -16,7 +16,7 @@ A warning or a refusal is due wherever
 Where all is harmless and no warning is due, at most 5 % of the cases may have one. The stated uncertainty may
 not be too large either: the median of mean height_std over mean |dz| should be at most 2.
 
-The first table, which `--untold` prints alone, is about what no contact can tell, whatever the method, and
+The first table, the only one with `--untold`, is about what no contact can show, whatever the method, and
 about measured normals that are turned: how often a warning was due, and how often "bayes" gave one.
 """
 
@@ -298,9 +298,9 @@ LINES = {  # The polynomials r^n sin(n theta) are 0 along planes at 0, 60 and 12
 def hidden(name, share):
     """Quadrics and a term of LINES, which is a share of the radius at the rim and 0 along the curves."""
     order = max(map(sum, LINES[name]))
-    beside = {ij: share * c / 13.0 ** (order - 1) for ij, c in LINES[name].items()}
+    added = {ij: share * c / 13.0 ** (order - 1) for ij, c in LINES[name].items()}
     bent = {n: {(2, 0): k1 / 2.0, (0, 2): k2 / 2.0} for n, (k1, k2) in BENT.items()}
-    return {n: (surfaces.graph({**terms, **beside}), 13.0) for n, terms in bent.items()}
+    return {n: (surfaces.graph({**terms, **added}), 13.0) for n, terms in bent.items()}
 
 
 def upright(value):
@@ -331,7 +331,7 @@ def _waves(k1, k2, height, p, q):
 LATE = (0.01, 0.02, 0.05, 0.1)
 UNTOLD = (
     *(
-        Sweep(f"{name} beside, of the radius at the rim", (0.005, 0.02, 0.05), (),
+        Sweep(f"{name} added, of the radius at the rim", (0.005, 0.02, 0.05), (),
               lambda v: Setting(turn=0.0), partial(hidden, name))
         for name in LINES
     ),
@@ -450,7 +450,7 @@ def untold_table(results):
                 f"{sum(f.status != 'ok' for f in of)}",
                 *(f"{100.0 * np.median([getattr(f, what) for f in made]):.2f}" for what in ("error", "std")),
             ])  # fmt: skip
-    table(["beside", "value", "cases", "needed", "needed but missing", "warned", "error", "stated"], rows)
+    table(["change", "value", "cases", "needed", "needed but missing", "warned", "error", "stated"], rows)
 
 
 HEAD = [
@@ -516,25 +516,25 @@ def _sheet(rows, sweeps, columns, height):
         weight="bold",
         y=1.0 - 0.16 / height,
     )
-    beside = columns == 2  # The key stands beside the panels or, in the large sheet, in the last cell.
-    lines = -(-(len(sweeps) + (not beside)) // columns)
+    key_column = columns == 2  # The key has a column of its own or, in the large sheet, the last cell.
+    lines = -(-(len(sweeps) + (not key_column)) // columns)
     grid = figure.add_gridspec(
         lines,
-        columns + beside,
+        columns + key_column,
         left=0.08,
         right=0.99,
         top=1.0 - 0.67 / height,
         bottom=0.27 / height,
         hspace=0.45,
         wspace=0.2,
-        width_ratios=[1.0] * columns + [0.8] * beside,
+        width_ratios=[1.0] * columns + [0.8] * key_column,
     )
     for number, sweep in enumerate(sweeps):
         cell = grid[divmod(number, columns)].subgridspec(3, 1, height_ratios=(3, 1.2, 1.4), hspace=0.08)
         axes = [figure.add_subplot(part) for part in cell]
         of = {m: [row for row in rows if (row[0], row[2]) == (sweep.title, m)] for m in METHODS}
         panel(axes, sweep, of, number % columns == 0)
-    key(figure.add_subplot(grid[0, columns] if beside else grid[divmod(len(sweeps), columns)]))
+    key(figure.add_subplot(grid[0, columns] if key_column else grid[divmod(len(sweeps), columns)]))
     return figure
 
 
@@ -599,7 +599,7 @@ def key(axes):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=SEEDS, help="of the noise (%(default)s)")
-    parser.add_argument("--untold", action="store_true", help="the first table alone")
+    parser.add_argument("--untold", action="store_true", help="only the first table")
     parser.add_argument("--redraw", action="store_true", help="draw docs/charts/stability.csv again")
     options = parser.parse_args()
     if options.redraw:

@@ -9,7 +9,7 @@ SAY_EVERY = {True: 0.5, False: 10.0}  # Seconds between lines, by whether they g
 
 
 class Progress:
-    """Counts touches or surfaces, of which `total` are to be made, and tells how many are made a second."""
+    """Counts touches or surfaces, of which `total` are to be made, and prints how many are made a second."""
 
     def __init__(self, noun: str) -> None:
         self.noun = noun

@@ -76,9 +76,11 @@ def cholesky(matrix: Array) -> Array:
 
 
 def cholesky_in_place(matrix: Array) -> Array:
-    """The diagonal (m,) of a triangular factor, which overwrites the upper triangle of the matrix (m, m).
+    """The diagonal (m,) of the Cholesky factor of a positive definite matrix (m, m).
 
-    Whoever calls it many times is on one thread already.
+    The factor itself overwrites the upper triangle of the matrix. Where the matrix is not positive definite
+    the factor ends early, which no error reports. Callers limit the threads themselves, with `on_one_thread`,
+    because they call it many times.
     """
     from scipy.linalg.lapack import dpotrf
 

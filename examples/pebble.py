@@ -4,8 +4,8 @@
 
     python examples/pebble.py [FOLDER]
 
-The contacts are those of three curves through the pebble's top and of five strokes beside it. They and their
-normals are noisy. FOLDER is that of this script if it is not given.
+The contacts are those of three curves through the pebble's top and of five strokes that do not pass through
+it. They and their normals are noisy. FOLDER is that of this script if it is not given.
 """
 
 import sys

@@ -21,7 +21,8 @@ HALF_AXES = np.array([32.0, 24.0, 17.0])  # of the pebble that is felt, in mm
 NOISE = 0.05  # mm
 # The first touch: a place on the object, the way outward, and the length of half a curve.
 START, OUTWARD, EXTENT = np.array([0.0, 0.0, 17.0]), np.array([0.0, 0.0, 1.0]), 12.0
-FAILS, LATE = 0.15, 0.3  # So many approaches fail, and so many answers come after the next order.
+# The shares of approaches that fail and of answers that come after the next order.
+FAILS, LATE = 0.15, 0.3
 
 
 class Pebble:
@@ -71,7 +72,7 @@ class Robot:
 
 
 def following(atlas, tried):
-    """The next touch beside those that were tried: that of an atlas, or the first."""
+    """The next touch, other than those that were tried: that of an atlas, or the first."""
     if atlas is not None:
         return atlas.next_touch(tried)
     planes = (core.SamplingPlane(turn) for turn in np.radians([0.0, 60.0, 120.0]))
@@ -80,7 +81,7 @@ def following(atlas, tried):
 
 
 def run(path, tolerance, most, seed):
-    """The atlas of all contacts, once it is "ok" or after so many orders."""
+    """The atlas of all contacts, once it is "ok" or after `most` orders."""
     contours = list(core.contacts_from_csv(path.read_text()).strokes) if path.exists() else []
     robot, atlas, failed, has_news = Robot([seed, len(contours)]), None, [], bool(contours)
     while True:
@@ -116,7 +117,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("contacts", type=Path, help="the file of all contacts, which need not exist")
     parser.add_argument("--tolerance", type=float, default=0.3, help="mean deviation, in mm (%(default)s)")
-    parser.add_argument("--touches", type=int, default=60, help="stop after so many orders (%(default)s)")
+    parser.add_argument("--touches", type=int, default=60, help="stop after this many orders (%(default)s)")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     atlas = run(options.contacts, options.tolerance, options.touches, options.seed)

@@ -204,7 +204,7 @@ def _open_contacts(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _save(path: Path, made: Object) -> None:
-    """Saves the scene, or by the path's ending the patch or map alone: .ply with attributes, or .json."""
+    """Saves the scene, or by the path's ending only the patch or map: .ply with attributes, or .json."""
     kind = path.suffix.lower()
     if kind == ".json":
         contact_file.write_patch(path, patch_record.reconstruction_of(made))

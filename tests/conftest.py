@@ -11,8 +11,8 @@ from hypothesis import HealthCheck, settings
 
 from tools import blender
 
-BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data" / "meshes"
-DATA = Path(os.environ.get("TACTILE_SCANS", BESIDE))  # docs/scans.md says where they are from.
+SHARED = Path(__file__).resolve().parents[2] / "shared" / "data" / "meshes"
+DATA = Path(os.environ.get("TACTILE_SCANS", SHARED))  # docs/scans.md says where they are from.
 
 # The quick and short ones draw the same examples every time, so that no test fails by chance.
 COMMON = {"deadline": None, "suppress_health_check": list(HealthCheck)}

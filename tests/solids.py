@@ -13,7 +13,7 @@ HAIR = 1e-12  # Distances below this share of the coordinates are rounding.
 
 @dataclass(frozen=True)
 class Solid:
-    """Answers rays by walking as far as its signed distance allows, from outside or from inside.
+    """Answers rays by sphere tracing: steps of its signed distance, from outside or from inside.
 
     distance : of a point (x, y, z), negative inside, and never larger than the true one
     start, outward : a point on it, and the normal there

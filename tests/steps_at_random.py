@@ -136,7 +136,7 @@ def _update(dice):
 
 
 def _copy(dice):
-    """Duplicates a probe, alone or with its patch."""
+    """Duplicates a probe, with or without its patch."""
     if len(probes()) < 3:
         chosen, patch = dice.choice(probes()), None
         if dice.random() < 0.5:

@@ -37,7 +37,7 @@ def test_links_lead_somewhere(page):
     for link in LINK.findall(FENCE.sub("", page.read_text(encoding="utf-8"))):
         if re.match(r"https?://", link):
             continue
-        # contributing.md and changelog.md are pages of the site alone, made of the files beside README.md.
+        # contributing.md and changelog.md are pages of only the site, made of the files next to README.md.
         name, _, anchor = link.partition("#")
         target = page.parent / name if name else page
         if page.parent.name == "docs" and name in ("contributing.md", "changelog.md"):

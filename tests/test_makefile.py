@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What make installs beside Blender."""
+"""What make installs in addition to Blender."""
 
 import subprocess
 from pathlib import Path

@@ -82,6 +82,6 @@ def test_every_row_is_a_message_and_in_a_test(row):
         return
     assert row in MESSAGES
     tests = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("*.py"))
-    told = " ".join(re.findall(r"\w+", tests))
+    words = " ".join(re.findall(r"\w+", tests))
     runs = [" ".join(part[i : i + 3]) for part in fixed for i in range(len(part) - 2)]
-    assert any(run in told for run in runs), "no test has any three words of it"
+    assert any(run in words for run in runs), "no test has any three words of it"

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 BUILD = Path(__file__).resolve().parents[1] / "build"
-# Tests that run beside each other each have their own Blender.
+# Tests that run at the same time each have their own Blender.
 RESOURCES = BUILD / ("blender-{}.{}".format(*sys.version_info) + os.environ.get("PYTEST_XDIST_WORKER", ""))
 os.environ["BLENDER_USER_RESOURCES"] = str(RESOURCES)
 

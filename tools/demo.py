@@ -18,7 +18,7 @@ NOISE = 1.0 / 1200.0  # A share of the object's size, as 0.05 mm is of 60 mm.
 WIDTH, HEIGHT = 1200, 900
 BAR_STEPS = 128
 BAR_REACH = 1.5  # Half the length of the color bar, in radii of the patch.
-BESIDE = 1.3  # The patch is this many radii to the left of the middle, so that the bar is beside the object.
+ASIDE = 1.3  # The patch is this many radii to the left of the middle, so that the bar is next to the object.
 BACKGROUND = (0.8, 0.82, 0.85, 1.0)
 
 
@@ -108,7 +108,7 @@ def stage(extension, report):
     away = 100.0 * radius
     camera.data.clip_end = 10.0 * away
     axes = Matrix((right, view.cross(right), view)).transposed()
-    camera.matrix_world = Matrix.LocRotScale(point + BESIDE * radius * right + away * view, axes, None)
+    camera.matrix_world = Matrix.LocRotScale(point + ASIDE * radius * right + away * view, axes, None)
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
     sun.data.energy, sun.data.angle = 2.0, 0.3
     sun.matrix_world = camera.matrix_world @ Matrix.Rotation(-0.6, 4, "X") @ Matrix.Rotation(-0.6, 4, "Y")

@@ -20,7 +20,7 @@ STROKES, TURNS = 7, 15  # The numbers of pictures of each curve, and of the turn
 SHORT, LONG = 90, 1500  # The milliseconds that a picture is shown.
 CAPTIONS = (
     "A finger slides along three curves",
-    "From them alone: the patch, by Gaussian curvature",
+    "From these curves: the patch, by Gaussian curvature",
     "Turn the planes, and the patch follows",
 )
 CURVE, FINGER = (0.02, 0.02, 0.02, 1.0), (0.9, 0.35, 0.02, 1.0)

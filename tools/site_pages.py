@@ -29,7 +29,7 @@ def on_config(config):
 
 
 def on_files(files, config):
-    """Adds the pages beside README.md."""
+    """Adds the pages that lie next to README.md."""
     for name, page in OUTSIDE.items():
         text = (ROOT / name).read_text(encoding="utf-8").replace("](docs/", "](")
         for other, its_page in OUTSIDE.items():

@@ -129,7 +129,7 @@ def _schema(columns: tuple[tuple[str, pa.DataType, str, str], ...]) -> pa.Schema
 
 
 TOUCH_SCHEMA = _schema(TOUCHES)
-# The schemas of the files in a folder, and of the file of objects beside it, by the folder's name.
+# The schemas of the files in a folder, and of the file of objects next to it, by the folder's name.
 SCHEMAS = {
     "touches": (TOUCH_SCHEMA, _schema(OBJECTS)),
     "surfaces": (_schema(SURFACES), _schema((*OBJECTS, *FOUND))),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A hand in a process of its own, which is started, asked, watched and ended here."""
+"""A hand in a process of its own, which is started, given orders, watched and ended here."""
 
 import os
 import platform

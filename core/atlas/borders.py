@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Borders of open sheets: where a finger feels the surface end, the mesh ends, too.
 
-Beside the paper. A mesh without the triangles that no patch covers ends in a zigzag, some edges away from the
+Not in the paper. A mesh without the triangles that no patch covers ends in a zigzag, some edges away from the
 border of the surface. Corners of a border are where its lines meet, as in extended marching cubes (Kobbelt et
 al. 2001) in the plane.
 """
@@ -36,7 +36,7 @@ SAME = 1e-6  # Lengths that differ by a smaller share are the same.
 
 PLACES_AT_ONCE = 1000  # A step feels this many places.
 
-# How far a surface is above points beside some places, found in steps.
+# How far a surface is above points near some places, found in steps.
 Offsets = Callable[[Array, Indices], Generator[float, None, Array]]
 
 
@@ -49,7 +49,7 @@ class Border(NamedTuple):
 
 
 def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, None, Border]:
-    """The border of the surface beside that of a mesh; yields 0 between its steps.
+    """The border of the surface next to that of a mesh; yields 0 between its steps.
 
     near : the finger feels the surface where that is within this length of the mesh
     """
@@ -61,7 +61,7 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
     places = mesh.vertices[at]
 
     def off(points: Array, which: Indices) -> Generator[float, None, Array]:
-        """How far the surface is above points (k, 3) beside some of the places, (k,)."""
+        """How far the surface is above points (k, 3) near some of the places, (k,)."""
         return _above(partial(finger.near, length=near), points, normals[which])
 
     lengths, ended = yield from _lengths(off, places, ways, STEP * mesh.edge)
@@ -75,8 +75,8 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
     a, b = places[before], places[after]
     chords = 0.5 * (a + b)
     above = yield from off(corners + INWARD * (chords - corners), before)
-    beside = yield from off(chords, before)
-    sharp &= np.isnan(above) == np.isnan(beside)
+    above_chord = yield from off(chords, before)
+    sharp &= np.isnan(above) == np.isnan(above_chord)
     corners += np.nan_to_num(above)[:, None] * normals[before]
     yield 0.0
     c, one, two = corners[sharp], ways[before], ways[after]

@@ -19,12 +19,12 @@ from ..triangles import normalized, row_dot
 from .cubic_spline import CUBIC, SIDE, bspline_weights, cubics
 
 # python -m benchmarks.atlas judges these.
-MARGIN = 1.12  # A patch counts to this share of its domain's radius: beside a crease it ends a step early.
+MARGIN = 1.12  # A patch counts to this share of its domain's radius: at a crease it ends a step early.
 AZIMUTHS = 96  # The radius of a domain is stored in this many directions.
 REACH = 0.5  # A patch is evaluated at places up to this share of its radius above or below it.
 # Weights of four neighbors (Catmull and Rom 1974), by the share of the way between the middle two.
 CATMULL_ROM = np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]]) / 2.0
-ASIDE = 0.3  # What is farther than this share of the radius beside the normal at its foot has no foot.
+ASIDE = 0.3  # What is farther than this share of the radius off the normal at its foot has no foot.
 FLAT = 0.15  # A patch is flat if it is nowhere steeper than this slope to its own plane.
 STEEPEST = 0.4  # Where a patch is steeper, this cosine to its own plane, it has no feet: heights run away.
 CHUNK = 24_000  # This many pairs of a place and a patch fit into the processor's cache at once.
@@ -92,8 +92,8 @@ class Charts:
         for start in range(0, max(len(points), 1), rows):
             some = points[start : start + rows]
             low, high = some.min(axis=0, initial=np.inf), some.max(axis=0, initial=-np.inf)
-            beside = self.origins - np.minimum(np.maximum(self.origins, low), high)
-            patch = np.flatnonzero(np.einsum("ni,ni->n", beside, beside) < reaches**2)
+            outside = self.origins - np.minimum(np.maximum(self.origins, low), high)
+            patch = np.flatnonzero(np.einsum("ni,ni->n", outside, outside) < reaches**2)
             place, which = np.nonzero(cdist(some, self.origins[patch], "sqeuclidean") < reaches[patch] ** 2)
             yield start + place, patch[which]
 

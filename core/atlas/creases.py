@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sharp edges and corners of a mesh: vertices where the sheets of two or three patches meet.
 
-Beside the paper; like the extended marching cubes of Kobbelt et al. 2001. An edge of the mesh whose ends lie
+Not in the paper; like the extended marching cubes of Kobbelt et al. 2001. An edge of the mesh whose ends lie
 on two sheets crosses their crease. The end that is near the crease moves onto it, or the edge is split there.
 At a corner one triangle has its vertices on three sheets.
 """
@@ -37,7 +37,7 @@ def insert_creases(
     normals : (n, 3), those of the sheets on which the vertices (n, 3) lie
     edge : the length of the edges
 
-    Returns vertices (n + k, 3) and triangles (m, 3); for each of the k new vertices an old one beside it,
+    Returns vertices (n + k, 3) and triangles (m, 3); for each of the k new vertices an old one next to it,
     (k,); and how far from what patches reach the vertices are that moved or came, (n + k,).
     """
     vertices, free, unfelt = vertices.copy(), np.ones(len(vertices), dtype=bool), np.zeros(len(vertices))
@@ -45,9 +45,9 @@ def insert_creases(
     yield 0.9
     sharp = np.einsum("ni,ni->n", normals[sides[:, 0]], normals[sides[:, 1]]) < SHARP
     sides = sides[sharp]
-    beside = np.zeros(len(vertices), dtype=bool)
-    beside[sides] = True
-    some = triangles[beside[triangles].all(axis=1)]
+    at_crease = np.zeros(len(vertices), dtype=bool)
+    at_crease[sides] = True
+    some = triangles[at_crease[triangles].all(axis=1)]
     a, b, c = normals[some].transpose(1, 0, 2)
     turned = [np.einsum("ni,ni->n", u, v) < SHARP for u, v in ((a, b), (b, c), (c, a))]
     some = some[np.all(turned, axis=0)]

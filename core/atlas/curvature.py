@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Curvatures of the joined surface, by quadrics that are as wide as its deviation requires.
 
-Beside the paper. The gradient of a quadric is linear, so its normals are n0 - W x along the tangent plane
+Not in the paper. The gradient of a quadric is linear, so its normals are n0 - W x along the tangent plane
 near a place, where W is the Weingarten map. It is fitted to the normals of the mesh there by weighted least
 squares. For a ball that is exact at any width; heights would need terms beyond those of a quadric.
 """
@@ -66,7 +66,7 @@ def sheets_of(mesh: Mesh) -> NormalSamples:
 def _ends(mesh: Mesh, normals: Array) -> Indices:
     """The edges (k, 2) of a mesh on its rims, and those where its triangles and the normals (n, 3) turn.
 
-    A folded triangle does not turn the normals beside it, which are those of larger triangles, too.
+    A folded triangle does not turn the normals at its corners, which are those of larger triangles, too.
     """
     sides = mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     keys = np.minimum(*sides.T) * len(mesh.vertices) + np.maximum(*sides.T)
@@ -74,10 +74,10 @@ def _ends(mesh: Mesh, normals: Array) -> Indices:
     first = np.flatnonzero(np.diff(keys[order]) == 0)
     pairs = np.stack([order[first], order[first + 1]])
     across = normalized(triangle_cross(mesh.vertices[mesh.triangles]))
-    beside = np.roll(mesh.triangles, -2, axis=1).ravel()[pairs]  # The corners that are not on the side.
+    opposite = np.roll(mesh.triangles, -2, axis=1).ravel()[pairs]  # The corners that are not on the side.
     is_end = np.ones(len(sides), dtype=bool)
     is_end[pairs] = (np.einsum("ni,ni->n", *across[pairs // 3]) < SHARP) & (
-        np.einsum("ni,ni->n", *normals[beside]) < TURNED
+        np.einsum("ni,ni->n", *normals[opposite]) < TURNED
     )
     return sides[is_end]
 

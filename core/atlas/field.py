@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The surface of many patches near a place: sheets, and the creases where these meet.
 
-Beside the paper. Which way the surface faces follows from the indicator of the whole object. Patches that
+Not in the paper. Which way the surface faces follows from the indicator of the whole object. Patches that
 face much alike are one sheet: a partition of unity with the weights of Ohtake et al. 2003 over each patch's
 variance. Where sheets meet, the inside is in both (a convex crease) or in either (a concave one), as the
 indicator has it on both sides of the crease.
@@ -151,7 +151,7 @@ def surface_at(charts: Charts, indicator: Indicator, points: Array, up: Array, b
 def surface_within_margin(
     charts: Charts, indicator: Indicator, points: Array, up: Array, band: float, margin: float = MARGIN
 ) -> SurfaceSample:
-    """The surface of `surface_at`, but only where patches are that count as far out as a margin."""
+    """The surface of `surface_at`, but only where patches are that count up to a margin."""
     pairs, count = charts.pairs(points, band, margin), len(points)
     pairs = pairs.chosen(np.einsum("mi,mi->m", pairs.normal, up[pairs.point_index]) > SIDEWAYS)
     rho = np.full(count, np.inf)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Patches of one object as tables, and joined: each becomes a spline through the contacts of all patches.
 
-A patch alone has only its own few curves. Where patches overlap, they are moved until they agree.
+A single patch has only its own few curves. Where patches overlap, they are moved until they agree.
 """
 
 from collections.abc import Generator, Sequence
@@ -46,7 +46,7 @@ def refit(
 ) -> Joining:
     """The tables of patches fitted to all contacts on them. Yields the share that is done.
 
-    charts : the tables of the same patches, fitted to their own contacts alone
+    charts : the tables of the same patches, fitted only to their own contacts
     earlier : number of contacts and table of each patch that was joined before; changed in place
     """
     points, normals, owner = _contacts(contours)
@@ -115,7 +115,7 @@ def blend_heights(charts: Charts) -> Joining:
             some = knots[start : start + PLACES_AT_ONCE]
             moves.ravel()[some] = _move(charts, some // SIDE**2, x[some], y[some])
             yield 1.0
-        # The outermost knots are beyond the spline, without a height: they move like those beside them.
+        # The outermost knots are beyond the spline, without a height: they move like those next to them.
         change = np.pad(moves[:, 1:-1, 1:-1], ((0, 0), (1, 1), (1, 1)), mode="edge")
         for axis in (1, 2):
             change = spline_filter1d(change, order=3, axis=axis, mode="mirror")
@@ -144,7 +144,7 @@ def _contacts(contours: Sequence[list[Contour]]) -> tuple[Array, Array, NDArray[
 
 
 def charts_of(results: Sequence[Reconstruction], deviations: bool = True) -> Charts:
-    """The tables of patches, each fitted to its own contacts alone; `deviations` may be left out, as 0."""
+    """The tables of patches, each fitted only to its own contacts; `deviations` may be left out, as 0."""
     return stacked(results, [tabulate(r, r.domain.radii(AZIMUTHS) / r.radius, deviations) for r in results])
 
 
@@ -163,7 +163,7 @@ def stacked(results: Sequence[Reconstruction], tables: Sequence[Table]) -> Chart
 
 
 def tabulate(r: Reconstruction, rim: Array, deviations: bool) -> Table:
-    """The table of a patch with this rim (AZIMUTHS,), in unit radius, fitted to its own contacts alone."""
+    """The table of a patch with this rim (AZIMUTHS,), in unit radius, fitted only to its own contacts."""
     from scipy.ndimage import spline_filter
 
     half = _half(rim)

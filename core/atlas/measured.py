@@ -24,18 +24,18 @@ from .orientation import doubt_of, oriented, place_text, planes_of, sharpened
 from .unfelt import uncovered_places
 
 # python -m benchmarks.robot judges these.
-FEWEST = 40  # The smallest patch has so many contacts.
-SOME_PLACES = 24  # At so many places it is tried how large a patch has to be.
-WIDENING, WIDENINGS = 1.4, 10  # Patches grow by this factor, at most so often.
-MISSED = 3.0  # Contacts are off a patch, in the median, by at most so many times what is expected.
-# Patches are so many of their radii from each other, and so many of the smallest one, but for contacts that
-# are farther out than a share of the radius up to which a patch reaches.
+FEWEST = 40  # The smallest patch has this many contacts.
+SOME_PLACES = 24  # The number of places at which it is tried how large a patch has to be.
+WIDENING, WIDENINGS = 1.4, 10  # Patches grow by this factor, at most this often.
+MISSED = 3.0  # Contacts are off a patch, in the median, by at most this multiple of what is expected.
+# Patches are at least the first share of their radius, and the second of the smallest one, from each other,
+# but for contacts that are farther out than the third, up to which a patch reaches.
 PATCHES_APART, MISSING, COVERED = 0.6, 0.6, 1.0
-RAY_PLACES = 24  # Where a patch ends is looked for at so many places on each ray.
-CHECKED = 1000  # So many contacts check the surface:
-OFF_STDS, OFF_CELLS = 5.0, 0.5  # they are off it if they are by so many deviations and cells,
+RAY_PLACES = 24  # Where a patch ends is looked for at this many places on each ray.
+CHECKED = 1000  # The number of contacts that check the surface:
+OFF_STDS, OFF_CELLS = 5.0, 0.5  # they are off it by more than this many deviations and cells,
 OFF = 0.03  # and not more than this share may be off or face the other way.
-ABREAST = 8  # So many neighbors of each contact are to face the same way.
+ABREAST = 8  # The number of neighbors of each contact that are to face the same way.
 SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
 OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
 # A ball is too large if neighbors below its centers lie the other way by more than this share of their
@@ -151,10 +151,11 @@ def _each_once(strokes: list[Contour]) -> tuple[list[Contour], Array]:
 
 
 def _require_one_side(points: Array, normals: Array) -> None:
-    """Raises ValueError if many measured normals (n, 3) of neighbors face opposite ways in one place.
+    """Raises ValueError if many measured normals (n, 3) of neighboring points (n, 3) face opposite ways.
 
-    On a sphere (n1 + n2) . (p2 - p1) = 0, and nearly so on any smooth surface between neighbors. If n2 has
-    the wrong sign, (n1 - n2) . (p2 - p1) is as small; for the two sides of a wall it is twice its thickness.
+    For points p1 and p2 of a sphere with normals n1 and n2, (n1 + n2) . (p2 - p1) = 0, and nearly so on any
+    smooth surface. If n2 has the wrong sign, (n1 - n2) . (p2 - p1) is as small. For the two sides of a wall,
+    which rightly face opposite ways, it is twice the thickness.
     """
     from scipy.spatial import cKDTree
 
@@ -237,7 +238,7 @@ class _Cloud(NamedTuple):
         return [r if isinstance(r, Reconstruction) else None for r in found]
 
     def rim(self, i: int, r: Reconstruction) -> Array:
-        """The radii (AZIMUTHS,) of a patch, in unit radius, as far as it has contacts beside it.
+        """The radii (AZIMUTHS,) of a patch, in unit radius, to where it has no contacts near it.
 
         Its domain is a hull of contacts, which may span what was not felt, such as a notch or a hole, and
         where its heights may run away from the surface.
@@ -251,8 +252,8 @@ class _Cloud(NamedTuple):
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
         x, y = r.radius * (shares[:, None, None] * domain[:, None] * ways).reshape(-1, 2).T
         places = r.frame.origin + np.stack([x, y, r.height(x, y)], axis=1) @ r.frame.axes.T
-        away, beside = cKDTree(self.contacts.points[near]).query(places)
-        empty = (away > BETWEEN * self.contacts.reach[near[beside]]).reshape(RAY_PLACES, AZIMUTHS)
+        away, nearest = cKDTree(self.contacts.points[near]).query(places)
+        empty = (away > BETWEEN * self.contacts.reach[near[nearest]]).reshape(RAY_PLACES, AZIMUTHS)
         ended = np.where(empty.any(axis=0), empty.argmax(axis=0), RAY_PLACES)
         return domain * np.maximum(ended, 1) / RAY_PLACES
 

@@ -26,8 +26,8 @@ from .tetrahedra import Indices, march, smoothed, subdivided, tetrahedra_of, uni
 CELL = 2.1  # A cube of the lattice is as long as this many edges of the mesh.
 CLIP = 0.25  # A vertex is at least this share of a lattice edge from both ends of it.
 SMOOTHINGS = 3  # This often vertices move toward their neighbors' mean.
-BESIDE = 8  # A place is felt if it is beside one of this many contacts that are nearest:
-BETWEEN = 1.5  # up to this many times as far from it as its neighbors are,
+NEAREST = 8  # A place is felt if it is close to one of this many contacts that are nearest:
+BETWEEN = 1.5  # within this multiple of the distance of its own neighbors,
 ONE_SIDED = 0.82  # if the mean of the directions to these is shorter; it is 2 / pi on a straight border.
 BRIDGED = 4.0  # Holes that are not larger than this many cells of the indicator are bridged.
 # Vertices that were off by more cells, or are of folded triangles, are moved again, this often.
@@ -123,10 +123,10 @@ class MeasuredContacts(NamedTuple):
     links: Indices
 
     def near(self, points: Array, normals: Array) -> NDArray[np.bool_]:
-        """Which places (k, 3) with normals (k, 3) are between contacts, of which one beside faces alike."""
+        """Which places (k, 3) with normals (k, 3) are between contacts, of which a near one faces alike."""
         from scipy.spatial import cKDTree
 
-        away, at = cKDTree(self.points).query(points, BESIDE)
+        away, at = cKDTree(self.points).query(points, NEAREST)
         alike = np.einsum("kbi,ki->kb", self.normals[at], normals) > FACING
         ways = normalized(self.points[self.links[at]] - points[:, None, None])
         between = np.linalg.norm(ways.mean(axis=2), axis=2) < ONE_SIDED
@@ -192,7 +192,7 @@ def meshed(
 
 
 def _level(indicator: Indicator, size: float) -> Generator[float, None, tuple[Array, Array, Indices]]:
-    """Vertices (n, 3) beside the level of the indicator, the way outward (n, 3) and triangles (m, 3).
+    """Vertices (n, 3) near the level of the indicator, the way outward (n, 3) and triangles (m, 3).
 
     size : the length of a cube of the lattice
     """
@@ -219,7 +219,7 @@ def _level(indicator: Indicator, size: float) -> Generator[float, None, tuple[Ar
 
 
 def _cells(indicator: Indicator, size: float) -> Generator[float, None, Indices]:
-    """The cubes around the grid's cells where the indicator changes its sign, and those beside, (n, 3)."""
+    """The cubes around the grid's cells where the indicator changes its sign, and adjacent ones, (n, 3)."""
     found, length = [], len(indicator.values)
     rows = max(1, 500_000 * length // indicator.values.size)
     for start in range(0, length - 1, rows):
@@ -235,11 +235,11 @@ def _cells(indicator: Indicator, size: float) -> Generator[float, None, Indices]
     ends = [np.floor((low + way * indicator.cell) / size).astype(np.intp) for way in ways]
     cells = ends[0]
     for which in np.ndindex(3 * (len(ways),)):
-        beside = unique(np.stack([ends[i][:, axis] for axis, i in enumerate(which)], axis=1))
-        cells = unique(np.vstack([cells, beside]))
+        shifted = unique(np.stack([ends[i][:, axis] for axis, i in enumerate(which)], axis=1))
+        cells = unique(np.vstack([cells, shifted]))
         yield 0.0
-    beside = np.vstack([np.zeros((1, 3), dtype=np.intp), np.eye(3, dtype=np.intp), -np.eye(3, dtype=np.intp)])
-    return unique((cells[:, None] + beside).reshape(-1, 3))
+    shifts = np.vstack([np.zeros((1, 3), dtype=np.intp), np.eye(3, dtype=np.intp), -np.eye(3, dtype=np.intp)])
+    return unique((cells[:, None] + shifts).reshape(-1, 3))
 
 
 def _project_and_smooth(
@@ -325,7 +325,7 @@ def _trim_unfelt(
 ) -> Generator[float, None, tuple[Mesh, Mesh]]:
     """The mesh without triangles where nothing was felt, and these; yields the share that is done.
 
-    Between patches it goes on as far as these may be continued, but not from a rim into the void. What is
+    Between patches it goes on up to where these may be continued, but not from a rim into the void. What is
     as small as some cells of the indicator is bridged. A later mesh ends where the first one did,
     where most of what lies beyond patches is off the first.
     """
@@ -339,8 +339,8 @@ def _trim_unfelt(
     links = np.ones(2 * len(beyond)), (beyond[:, :2].ravel(), beyond[:, 1:].ravel())
     count, piece = connected_components(coo_matrix(links, (len(vertices),) * 2))
     yield 0.9
-    beside = np.bincount(piece[inside], minlength=count) > 0
-    gone = ~inside & ~beside[piece]
+    meets_inside = np.bincount(piece[inside], minlength=count) > 0
+    gone = ~inside & ~meets_inside[piece]
     if ended is None:
         # Each vertex has a third of its triangles' area, so that a hole is as large with any length of edges.
         far = np.linalg.norm(triangle_cross(vertices[beyond]), axis=1) / 6.0 * (~near[beyond]).sum(axis=1)

@@ -348,7 +348,7 @@ class Atlas:
         """Curvatures (n,) at points of the surface (n, 3) with outward unit normals (n, 3), by name.
 
         They are Gaussian and mean curvature, each with its standard deviation under its name and "_std",
-        shape index and curvedness. Where they are unknown, which is beside creases and rims and where there
+        shape index and curvedness. Where they are unknown, which is near creases and rims and where there
         is no surface, these are 0 and the deviations inf.
         """
         steps = chunked(partial(curvatures_of, self._sheets), CURVED_AT_ONCE, 1.0, points, normals)

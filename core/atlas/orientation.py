@@ -17,20 +17,18 @@ from ..triangles import normalized
 from .tetrahedra import Indices
 
 # python -m benchmarks.measured --orientation judges these.
-FEWEST, MOST, MORE = 8, 600, 1.5  # A plane has so many neighbors, by this factor more until it is certain:
+FEWEST, MOST, MORE = 8, 600, 1.5  # The numbers of a plane's neighbors, and their growth until it is certain:
 ACROSS = 0.15  # they do not lie in a line if this share of the larger variance is across,
 FLAT = 0.05  # and lie in a plane if at most this share of the smaller one is off it,
-NOISES = 8.0  # and they reach so many deviations of a contact far.
-FLATTER, THROUGH = 0.5, 2.0  # A neighbor's plane is so much flatter, and passes by within so many deviations.
-LINKS = 12  # A contact is linked with so many of its neighbors.
-AT_ONCE = 20_000  # So many contacts are taken at once.
+NOISES = 8.0  # and they reach this many deviations of a contact far.
+FLATTER, THROUGH = 0.5, 2.0  # A neighbor's plane is flatter by this factor, at most this many deviations off.
+LINKS = 12  # A contact is linked with this many of its neighbors.
+AT_ONCE = 20_000  # This many contacts are taken at once.
 BEND = 0.1  # Links along which the surface goes on come before those around edges and across gaps,
 STROKE = 0.5  # and those along strokes before others.
-STEP = (
-    2.0  # Successive contacts are linked if they are at most so many times as far apart as neighbors reach.
-)
+STEP = 2.0  # Successive contacts are linked if they are apart by at most this multiple of neighbors' reach.
 LEAST_VOTE = 1e-6  # No vote counts less.
-BRIDGES = 8  # Pieces are linked by so many of their nearest contacts.
+BRIDGES = 8  # Pieces are linked by this many of their nearest contacts.
 OPPOSED = -0.3  # A link contradicts the sides of its contacts if its cosine is less.
 DOUBTED = 0.02  # Not more contacts than this share may contradict their neighbors,
 CONFUSED = 0.05  # and not more than this share may have the other side of a wall among their neighbors.
@@ -39,8 +37,8 @@ CLOSED = 0.15  # Contacts show their outer side if the mean of their winding num
 DECISIVE = 0.3  # A hint decides if the mean cosine between it and the normals is more.
 CERTAIN = 0.02  # Links of less weight are certain,
 SMALL = 0.1  # and a region has at least this share of all contacts.
-ROUNDS = 3  # Regions are tried so often.
-PROBES = 30  # Winding numbers are computed at so many contacts of a region.
+ROUNDS = 3  # Regions are tried this often.
+PROBES = 30  # Winding numbers are computed at this many contacts of a region.
 
 
 class Planes(NamedTuple):
@@ -94,7 +92,7 @@ def planes_of(points: Array, noise: float) -> Planes:
 def sharpened(points: Array, normals: Array, planes: Planes) -> Array:
     """Outward normals (n, 3) of the planes of contacts or, where these bend around an edge, of a neighbor's.
 
-    Beside an edge the neighbors of a contact are on two walls. Those of a contact farther from it lie in a
+    Near an edge the neighbors of a contact are on two walls. Those of a contact farther from it lie in a
     plane that passes through both.
     """
     links, rms = planes.links, planes.rms
@@ -206,7 +204,7 @@ def _propagated_signs(
 
 
 def _regions(tree: Any, n: int) -> Indices:
-    """The regions (n,) of a tree that its uncertain links separate; small ones are a part of those beside."""
+    """The regions (n,) of a tree that its uncertain links separate; small ones join adjacent ones."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 

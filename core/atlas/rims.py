@@ -28,7 +28,7 @@ HALVINGS = 5  # This many halvings find where a patch ends,
 LEAST_RIM = 0.02  # which is at least this share of its largest radius away.
 STEEP = 0.7  # A patch ends where it is steeper, this cosine to its own plane.
 INWARD = 0.98  # A corner is felt at this share of its radius.
-NARROWEST = 5.0  # A patch reaches at most this many times as far as it is wide.
+NARROWEST = 5.0  # A patch reaches at most this many times its width.
 SLOPE = 1e-3  # Slopes are differences over this share of the radius.
 
 
@@ -57,8 +57,8 @@ def radial_extent(r: Reconstruction, finger: Finger, near: float) -> Array:
     between = r.radius * radii * np.stack([np.cos(turns), np.sin(turns)])
     met = np.isfinite(_offsets(r, finger, near, INWARD * between))
     straight[1::2][met] = radii[met]
-    beside = np.repeat(ended | np.roll(ended, -1), AZIMUTHS // TAPS)
-    rim = np.where(beside, straight, domain)
+    is_end = np.repeat(ended | np.roll(ended, -1), AZIMUTHS // TAPS)
+    rim = np.where(is_end, straight, domain)
     # Rays from its middle do not resolve the ends of a narrow patch.
     across = np.roll(rim, AZIMUTHS // 4) + np.roll(rim, -AZIMUTHS // 4)
     return np.minimum(rim, NARROWEST * across)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Heights as a smoothing spline through contacts and across normals, as smooth as these show it to be.
 
-Beside the paper. It is a cubic B-spline on SIDE x SIDE knots. Its prior is that of a surface with random
+Not in the paper. It is a cubic B-spline on SIDE x SIDE knots. Its prior is that of a surface with random
 derivatives of second or third order (Wahba 1990, on knots as by Eilers and Marx 1996): a weathered surface
 has the former, and a smooth one the latter, which leaves quadrics free. The order, the size of these
 derivatives, and the deviations of contacts and normals follow from the marginal likelihood; outlying contacts
@@ -238,7 +238,7 @@ def penalty(order: int) -> tuple[Array, float, float]:
     """The sum of squares of all derivatives of an order, by differences, for knots at distance 1.
 
     Returns its band; the log of the product of its eigenvalues above 0; and the log of the volume that the
-    terms x^2, xy and y^2 on [-1, 1]^2 span beside planes, or 0 if this order does not leave them free.
+    terms x^2, xy and y^2 on [-1, 1]^2 span beyond planes, or 0 if this order does not leave them free.
     """
     from scipy.sparse import csr_matrix, kron
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Marching tetrahedra on a body-centered lattice. Beside the paper.
+"""Marching tetrahedra on a body-centered lattice. Not in the paper.
 
 Each tetrahedron is cut by its signs (Doi and Koide 1991), so what comes out is a manifold. The lattice is
 that of Labelle and Shewchuk 2007: its tetrahedra are all alike.

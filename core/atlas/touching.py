@@ -30,8 +30,8 @@ from .reference_mesh import ReferenceMesh
 # python -m benchmarks.atlas judges these.
 MOST = 1000  # There are at most this many touches, unless the caller says otherwise.
 FIRST_EXTENT = 300.0  # A half curve of the first touch is at most this many tolerances long.
-GOOD = 10.0  # The first patch is looked for beside the start if its radius is below this many tolerances,
-BESIDE, AROUND = (10.0, 30.0), 8  # at these many tolerances away, in this many directions.
+GOOD = 10.0  # The first patch is looked for near the start if its radius is below this many tolerances,
+AWAY, AROUND = (10.0, 30.0), 8  # at these many tolerances away, in this many directions.
 SIZE = 1.4  # A patch may have a mean deviation of this many tolerances before its neighbors are known.
 SMALL = 5.0  # Touches do not go on from a patch whose radius is below this many tolerances.
 NARROW = 1.0  # Where a touch was in vain before, a patch needs a radius of only this many tolerances.
@@ -54,7 +54,7 @@ class Progress(NamedTuple):
     """How far the touches of an object are.
 
     done : number of touches
-    uncovered : number of places that are uncovered, as far as was felt
+    uncovered : number of places that are known to be uncovered
     found : the touches since the last Progress
     rims : how far the finger feels each of their patches all round, (AZIMUTHS,), a length
     joining : share of joining the patches to one surface that is done; None while the object is touched
@@ -138,9 +138,9 @@ class _Run:
             yield from self.show(self.now(joining))
 
     def first(self, point: Array, up: Array) -> Progress:
-        """Makes the touch from which all others go on. Raises ValueError if it fails, and those beside it.
+        """Makes the touch from which all others go on. Raises ValueError if it and those near it fail.
 
-        Where the point is on a crease or in a corner, a place beside it makes a better patch.
+        Where the point is on a crease or in a corner, a place near it makes a better patch.
         """
         p, n = vector_of(point), vector_of(up)
         best, why = None, None
@@ -172,11 +172,11 @@ class _Run:
         return self.now(new=[first])
 
     def _places(self, point: Vector, up: Vector) -> Iterator[tuple[Vector, Vector]]:
-        """The point and its outward direction, then contacts of a finger that comes down on places beside."""
+        """The point and its outward direction, then contacts of a finger that comes down near it."""
         yield point, up
         e1 = tangent_of(up, None)
         e2 = cross(up, e1)
-        for length in BESIDE:
+        for length in AWAY:
             for turn in np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False):
                 reach = length * self.tolerance
                 way = along(scaled(e1, math.cos(turn)), e2, math.sin(turn))

@@ -12,7 +12,7 @@ from .frontier import RimPlace
 from .meshing import Mesh
 from .reference_mesh import ReferenceMesh
 
-APART = 0.8  # Places are at least so many radii of the patch beside them from each other.
+APART = 0.8  # Places are at least this many radii of the adjacent patch from each other.
 STEEP = 0.95  # The way from a patch to its rim is not along the normal there by a larger cosine.
 
 

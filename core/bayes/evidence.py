@@ -19,20 +19,21 @@ from .prior import FREE, USUAL_WAVINESS, prior_variances
 # Chosen with benchmarks.accuracy.
 WAVINESS = np.geomspace(0.15, 1.3, 6)
 WAVINESS_SPREAD = 0.5  # The waviness has a log-normal prior with the median USUAL_WAVINESS and this sigma.
-NOISES = 5  # The grid of the noise has so many points, from the floor up.
+NOISES = 5  # The number of points in the grid of the noise, from the floor up.
 ROUNDING = 1e-13  # Rounding takes at most this share of a system's trace.
 UNLIKELY = 1400.0  # The exponential of half this difference of -2 log likelihood is still a number.
-GROUP = 4  # The likelihoods of so many touches are computed at once (benchmarks.speed).
+GROUP = 4  # The number of touches whose likelihoods are computed at once (benchmarks.speed).
 # Chosen with benchmarks.real.
 AMPLITUDES = np.array([0.003, 0.01, 0.04, 0.14, 0.5])  # Grid of the process's deviation, in unit radius.
 SEXTIC_WAVINESS = np.array([0.3, 0.6, 1.2])  # The waviness of the polynomials that a process competes with.
 PROCESS_NOISES, MIDDLE = 3, 1  # Grid points of the noise, up to what the sextic leaves; the middle one.
 ODDS = 0.2  # There is a process from these odds on: it costs a smooth surface little.
 NEGLIGIBLE = 160.0  # If -2 log likelihood exceeds the best by more, no other noise is tried.
-# Prior variance of slopes and second derivatives beside a process: with 100 they run away if curves end
-# early.
+# Largest prior variance of slopes and second derivatives in a model with a process: with 100 they run away if
+# curves end early.
 MOST_VARIANCE = 0.06
-# The likelihood counts by this power beside a process: neighbors on a curve show no waves between curves.
+# The power of the likelihood in a model with a process, because neighbors on a curve show no waves between
+# curves.
 POWER = 0.1
 
 

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The fit of polynomials, which finds their Darboux frames and weighs outliers down, many touches at once.
 
-Beside the paper. Each pass solves for all coefficients in the axes so far; then the axes turn to the normal
+Not in the paper. Each pass solves for all coefficients in the axes so far; then the axes turn to the normal
 and the principal directions that were found, and outlying contacts are weighed down. All functions fit b
-touches at once: of one, most of the time goes into calling numpy.
+touches at once: with one touch, most of the time goes into calling numpy.
 """
 
 import math
@@ -25,14 +25,14 @@ from .sextic import Sextics, mean_given, posterior_given, sextics, with_scatter
 # follows what polynomials leave, and automatic touches end earlier (benchmarks.model).
 MISFIT = 2e-3
 # benchmarks.accuracy judges these, and the outliers of benchmarks.stability the last two.
-# There are at most so many passes: two turn the frame to what they found, others are for outliers.
+# The largest number of passes: two turn the frame to what they found, others are for outliers.
 PASSES = 8
 SETTLED_WEIGHT = 0.1  # A fit is settled when no weight changes by more between passes.
 ALIKE_CURVATURES = 1e-4  # Curvatures that differ by less count as alike; heights change by an eighth of it.
 LEVEL = 5e-3  # Axes are level when the slope is less: heights change by its product with slope and height.
-DECIMALS = 9  # Heights and distances count to so many decimals, so that rounding does not choose.
+DECIMALS = 9  # Heights and distances are compared to this decimal, so that rounding does not choose.
 OUTLYING = 5.0  # A contact off by more standard deviations is an outlier.
-STUDENT = 4.0  # Outliers weigh as under a Student t distribution of so many degrees of freedom.
+STUDENT = 4.0  # Outliers weigh as under a Student t distribution of this many degrees of freedom.
 
 
 class Observations(NamedTuple):

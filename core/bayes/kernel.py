@@ -16,7 +16,7 @@ from ..arguments import Array
 from ..lapack import cholesky
 
 LENGTHS = np.array([0.4, 1.6])  # The lengths l_i, as shares of the radius (benchmarks.real).
-DISTANCES_AT_ONCE = 6000  # So many distances fit into a processor's cache.
+DISTANCES_AT_ONCE = 6000  # The number of distances that fit into a processor's cache.
 KERNEL_ROUNDING = 1e-9  # This share of its mean is added to the diagonal of k(u, u), so that it has a factor.
 PARTIALS = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
 

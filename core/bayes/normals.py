@@ -6,8 +6,8 @@ The measured unit normal m is off the surface's normal (-z_x, -z_y, 1) by no mor
 be unit vectors across m and each other: a . (-z_x, -z_y, 1) and b . (-z_x, -z_y, 1) are 0, except for an
 error of |(z_x, z_y, 1)| times the deviation of m. Both are linear in the coefficients.
 
-Contacts alone show the surface's slopes and second derivatives at the point, and so do normals. How far apart
-the two are is judged by the deviations of both. The normals of a texture scatter about the patch by more than
+Contacts by themselves show the surface's slopes and second derivatives at the point, and so do normals. The
+difference is judged by the deviations of both. The normals of a texture scatter about the patch by more than
 their deviation, which is no contradiction; so their scatter counts as deviation too. Along the curves,
 though, contacts show a texture as normals do: normals that scatter widely there are wrong.
 """
@@ -77,9 +77,9 @@ def contradiction(contacts: Array, normals: Array, posterior: SurfacePosterior) 
     """The number of deviations, and the angle in the root mean square, by which normals contradict contacts.
 
     contacts, normals : (n, 3), of `measured_normals`
-    posterior : of the contacts alone, in the same frame and unit; without a process
+    posterior : of the contacts without their normals, in the same frame and unit; without a process
 
-    The angle is in radians. Both are 0 if there are too few normals to tell.
+    The angle is in radians. Both are 0 if there are too few normals to judge.
     """
     if 2 * len(normals) <= FREE:
         return 0.0, 0.0

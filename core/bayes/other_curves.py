@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether one curve contradicts the others, as if it were flipped or its plane were another.
 
-Beside the paper. Three curves always agree, because the normal curvatures H + A cos 2 phi + B sin 2 phi are
-three numbers. Where there are more contacts, all others tell where each curve should be, with a deviation.
+Not in the paper. Three curves always agree, because the normal curvatures H + A cos 2 phi + B sin 2 phi are
+three numbers. Where there are more contacts, all others predict each curve, with a deviation.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from ..arguments import Array
 from .joint_fit import posteriors_of
 from .posterior import SurfacePosterior
 
-ENOUGH = 4  # So many curves, or strokes in place of one, may contradict each other.
+ENOUGH = 4  # The least number of curves, where all strokes count as one, that can contradict each other.
 OUTER = 0.5  # A curve counts from this share of its reach on, where it leaves the tangent plane.
 NOTICED = 4.0  # Waviness and noise of the others are found where this many deviations are exceeded without.
 
@@ -24,11 +24,11 @@ def contradicting_curve(
     """The number of deviations, and the height in unit radius, by which a curve is off what the others show.
 
     contacts : (n, 3), besides the reference point, in the frame and in unit radius
-    curve : (n,), the number of the curve of each, -1 beside curves
+    curve : (n,), the number of the curve of each contact, -1 for contacts of strokes
     posterior : of all contacts; noise : least deviation of a contact
 
     Both are medians over the outer contacts of the curve that is off by most deviations, so outliers do not
-    count. They are 0 if there are too few curves to tell.
+    count. They are 0 if there are too few curves to judge.
     """
     numbers = np.unique(curve)
     if len(numbers) < ENOUGH:

@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What contacts show of a surface and what they leave open: a Gaussian process with explicit basis functions.
 
-Beside the paper, after Rasmussen and Williams (2006), section 2.7. In unit radius and in the Darboux frame,
+Not in the paper; after Rasmussen and Williams (2006), section 2.7. In unit radius and in the Darboux frame,
 
     z = phi' b + g,
 
 where phi are the terms of degree 1 to 6, b has the prior of prior.py, and g has zero mean and the covariance
-of kernel.py. Where contacts ask for no g, z is a polynomial.
+of kernel.py. Where the evidence does not favor g, z is a polynomial.
 """
 
 import math
@@ -38,7 +38,7 @@ from .prior import FREE, ORDERS
 WINDING = 1j * (TERMS[:, 0] - TERMS[:, 1])  # A turn by t adds (i - j) t to the phase of z^i z'^j, z = x + iy.
 LEAST_DEGREE = 2  # No patch has a lower degree.
 DISK = 0.95  # A patch of lower degree is fitted over a disk of this radius: not all curves end at L.
-QUARTIC_SHARE = 0.6  # Share of the radius (benchmarks.real); 0.8 takes in what says nothing of the point.
+QUARTIC_SHARE = 0.6  # Share of the radius (benchmarks.real); 0.8 takes in what has no bearing on the point.
 ALIKE = 0.05  # Curvatures that differ by less make no directions, as in the rule of benchmarks.stability.
 CONFIDENCE = 0.95  # Directions are judged with this probability.
 ROUND = 12.59  # The quantile at CONFIDENCE of chi squared with six degrees of freedom.
@@ -64,9 +64,9 @@ class SurfacePosterior(HeightField):
     root : (..., r, 28 + m), of the features' covariance; the column of the feature 1 is 0 if the height at
         the origin is exact, as at a reference point that was touched
     noise : (...), standard deviation of a contact
-    visibility : (..., 22, 22), upper triangular: its singular values tell how well the contacts show each
-        direction among the terms of degree 3 to 6, in units of noise, for a surface of waviness 1; the
-        singular values of a leading block tell that of the terms up to a lower degree
+    visibility : (..., 22, 22), upper triangular: its singular values are how well the contacts show each
+        direction among the terms of degree 3 to 6, in units of noise, for a surface of waviness 1; those of a
+        leading block are how well they show those among the terms up to a lower degree
     places : (m, 2), the places u; none without a process
     alpha : (m,); variances : (2,), of g, for each of LENGTHS
     sextic : the posterior without g where frame and curvatures are its own, because it averages the facets of

@@ -1,13 +1,12 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The fit with a process, where contacts ask for it: a Gaussian process with explicit basis functions.
+"""The fit with a process, where evidence favors it: a Gaussian process with explicit basis functions.
 
 A real surface has different curvatures at each scale, and those at the point itself belong to its texture.
 So its frame and curvatures are those of the quartic that is nearest to z over a disk (SurfacePosterior's
-`polynomial`). Compared with dense fits of the scans, they are off at most half as far as those of the sextic
-fitted to the contacts alone, and their intervals are true. If contacts are off that sextic by less than
-MISFIT, as on a smooth surface whose mesh has facets, its frame and curvatures are kept, because it averages
-the facets.
+`polynomial`). Compared with dense fits of the scans, their errors are at most half those of the sextic fitted
+without a process, and their intervals are true. If contacts are off that sextic by less than MISFIT, as on a
+smooth surface whose mesh has facets, its frame and curvatures are kept, because it averages the facets.
 """
 
 from dataclasses import replace
@@ -26,9 +25,9 @@ from .normals import slope_equations, term_slopes
 from .posterior import SurfacePosterior, nearest_quartic
 
 # Chosen with benchmarks.real.
-PROCESS_MISFIT = 5e-4  # Beside a process the noise is at least this share of the radius: facets and rounding.
+PROCESS_MISFIT = 5e-4  # With a process the noise is at least this share of the radius: facets and rounding.
 UNEXPLAINED_MISFIT = 1.3  # A sextic does not explain contacts that are off it by more times their noise.
-MOST_PLACES = 150  # About so many contacts at most carry a process and show how large it is.
+MOST_PLACES = 150  # At most about this many contacts carry a process and show how large it is.
 
 
 class Touch(NamedTuple):
@@ -70,11 +69,11 @@ def touch_of(contacts: Array, roots: Array, normals: Array, places: NDArray[np.i
 def process_fit(
     given: Observations, weights: Array, posterior: SurfacePosterior, ranks: NDArray[np.intp], through: bool
 ) -> tuple[Array, Array, list[SurfacePosterior]]:
-    """The fits of b touches, with a process where their contacts ask for one, and unchanged elsewhere.
+    """The fits of b touches, with a process where the evidence favors one, and unchanged elsewhere.
 
     given : in the Darboux frames of the sextics, whose posteriors are a stack
     weights : (b, n), 0 where there is no contact
-    ranks : (b, n), of the contacts on each half of a curve, from the rim, and of those beside
+    ranks : (b, n), of the contacts on each half of a curve, from the rim, and of those of strokes
     through : whether the origin was touched
 
     Returns the columns d1, d2, n (b, 3, 3) in the frame given, the new radii (b,) in its unit, and the
@@ -85,7 +84,7 @@ def process_fit(
     off, most = np.abs(posterior.residuals(given.contacts)), np.maximum(posterior.noise, least)
     rms = np.sqrt((weights * off**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0))
     for i in np.flatnonzero(rms > UNEXPLAINED_MISFIT * least):
-        # The point is a contact like the others: on facets it may be off as far.
+        # The point is a contact like the others: on facets its residual may be as large.
         there, point = np.flatnonzero(weights[i]), np.zeros((int(through), 3))
         normals = given.normals[i] if not given.normals.size else np.vstack([given.normals[i][there], point])
         roots = np.sqrt(np.append(weights[i, there], np.ones(len(point))))

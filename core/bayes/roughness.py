@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How rough a surface is, by one linear solve: what a sextic of usual waviness leaves of its contacts.
 
-A fit takes twenty times as long, and is not needed if this alone shows that it could not be trusted.
+A fit takes twenty times as long, and is not needed if the roughness shows that it could not be trusted.
 """
 
 import math
@@ -17,8 +17,8 @@ from .prior import USUAL_WAVINESS, prior_variances
 from .sextic import mean_given, sextics
 
 # benchmarks.extents judges these.
-EXPLAINED_TERMS = 15  # Three curves show so many of the 27 terms, which as many contacts determine.
-NOISY = 1.5  # Contacts may be off by so many times their noise for no other reason.
+EXPLAINED_TERMS = 15  # Three curves show this many of the 27 terms, which take as many degrees of freedom.
+NOISY = 1.5  # Contacts may be off by this multiple of their noise for no other reason.
 
 
 def roughness(contacts: Array, noise: float) -> float:

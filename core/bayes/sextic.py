@@ -18,7 +18,7 @@ from .normals import slope_equations
 from .posterior import SurfacePosterior
 from .prior import FREE, PRIOR_SCALE
 
-LEAST_FREEDOM = 5.0  # Few contacts count as so many degrees of freedom, because a prior adds to them.
+LEAST_FREEDOM = 5.0  # The least number of degrees of freedom: to few contacts a prior adds some.
 
 
 class Sextics(NamedTuple):

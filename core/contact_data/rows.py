@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rows of contacts as arrays: many at once, or one by one to say what is wrong with which."""
+"""Rows of contacts as arrays: many at once, or one by one to find the row that is wrong."""
 
 import csv
 import math
@@ -25,7 +25,7 @@ class Contacts(NamedTuple):
     unit : of all lengths, such as "mm"; "" if it is not known
     point : the reference point, three numbers, or None
     outward : a direction to the outer side, three numbers, or None
-    strokes : curves beside the reference point
+    strokes : curves that do not pass through the reference point
     """
 
     contours: list[Contour]

@@ -30,7 +30,7 @@ UNIT_METERS = {
 }
 VECTOR_KEYS, CURVE_KEYS = ("point", "outward"), ("noise", "normal_std", "ball")  # Keys of the comments.
 COLUMNS = ("curve", "time", *POINT_COLUMNS, *NORMAL_COLUMNS)
-STROKE = "stroke"  # The names of curves that run beside the reference point begin with this.
+STROKE = "stroke"  # The names of curves that do not pass through the reference point begin with this.
 
 
 def contacts_from_csv(text: str, name: str = "the table") -> Contacts:
@@ -132,7 +132,7 @@ def _with(name: str, contour: Contour, key: str, std: float | None) -> Contour:
 
 
 def _metadata(name: str, text: str) -> dict[str, Any]:
-    """What the comments of a text that `contacts_to_csv` has written say, by key; nothing for others."""
+    """The values in the comments of a text that `contacts_to_csv` has written, by key; {} for others."""
     if not text.startswith(TITLE):
         return {}
     metadata: dict[str, Any] = {}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The point where measured curves meet, if it is not given. Beside the paper."""
+"""The point where measured curves meet, if it is not given. Not in the paper."""
 
 import math
 from collections.abc import Sequence

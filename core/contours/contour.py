@@ -84,7 +84,7 @@ class Contour:
     ball : radius of a ball whose centers the points are; None if they are contacts
 
     Repeated contacts, as of a sensor at rest, are there once, with the mean of their normals, because they
-    tell no more.
+    add no information.
 
     Raises ValueError for another shape, for numbers that are not finite, for numbers of single
     precision too far from the origin, and for measured normals without a direction.

@@ -85,8 +85,8 @@ def curves_through(r: Array, present: NDArray[np.bool_], normals: Array | None =
     """
     shape, each = present.shape, np.arange(present[..., 0].size)
     r, present, curve = r.reshape(len(each), -1, 3), present.reshape(len(each), -1), each[:, None]
-    distance, beside = distances_from_point(r)
-    present = present & beside
+    distance, off_point = distances_from_point(r)
+    present = present & off_point
     far = np.where(present, distance, np.inf)
     near = far.argsort(axis=1, kind="stable")[:, :WINDOW]
     counts = present.sum(axis=1)

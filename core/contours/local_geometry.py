@@ -54,7 +54,7 @@ def principal_curvatures(
 ) -> tuple[Array, Array, Array]:
     """kappa1 <= kappa2 and the angle of d1 in radians, above -pi/2 and up to pi/2, (...) each.
 
-    They follow from normal curvatures (..., c) at angles (..., c) in radians, as far as these are `known`, by
+    They follow from those normal curvatures (..., c), at angles (..., c) in radians, that are `known`, by
     formula (2) in the form kappa_i = H + A cos 2 phi_i + B sin 2 phi_i. It is linear: exact for three curves,
     and solved by least squares for more. At an umbilic d1 is at angle 0: there A and B are within rounding of
     0, compared with 1 and the curvatures, so pass these in unit radius.

@@ -29,11 +29,11 @@ def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:
     if len(contour.points) <= MOST_CONTACTS:
         return contour, 1
     r = contour.points - point
-    beside = np.flatnonzero(distances_from_point(r)[1])
-    size = math.ceil(len(beside) / MOST_CONTACTS)
+    off_point = np.flatnonzero(distances_from_point(r)[1])
+    size = math.ceil(len(off_point) / MOST_CONTACTS)
     if size <= 1:
         return contour, 1
-    r = r[beside]
+    r = r[off_point]
     along = _signed_positions(r, max(WINDOW * size, len(r) // 4))
     order = np.argsort(along, kind="stable")
     before = int(np.count_nonzero(along < 0.0))
@@ -51,7 +51,7 @@ def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:
     fewer = replace(
         contour,
         points=point + means(r),
-        normals=None if normals is None else means(consistently_oriented(normals[beside], order, starts)),
+        normals=None if normals is None else means(consistently_oriented(normals[off_point], order, starts)),
         noise=None if noise is None else noise / root,
         normal_std=None if std is None else std / root,
     )
@@ -73,6 +73,6 @@ def _signed_positions(r: Array, count: int) -> Array:
 
 
 def _group_bounds(length: int, size: int) -> NDArray[np.intp]:
-    """The bounds, from 0 to the length, of groups of about this size; 0 alone if the length is 0."""
+    """The bounds, from 0 to the length, of groups of about this size; only 0 if the length is 0."""
     count = max(1, length // size) if length else 0
     return np.arange(count + 1, dtype=np.intp) * length // max(count, 1)

@@ -101,7 +101,7 @@ class _Half:
 
 @dataclass(eq=False)
 class _Curve:
-    """A contour as far as it was followed, with the normal of its plane; points and normals are (n, 3)."""
+    """The part of a contour that was followed, and the normal of its plane; points and normals are (n, 3)."""
 
     across: Vector
     halves: list[_Half]

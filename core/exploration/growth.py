@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How far half curves can be followed from the reference point, as long as fits explain their contacts.
 
-The generators here yield an Ask and are sent the Reconstruction of its contours, or why there is none.
+The generators here yield a Request and are sent the Reconstruction of its contours, or why there is none.
 So touches of one surface can grow side by side, and their fits be done in stacks.
 """
 
@@ -38,11 +38,11 @@ MAX_RESIDUAL_RATIO = 3.0  # The root mean square residual of a half curve may be
 
 Counts = NDArray[np.intp]  # Numbers of contacts of the c contours on either side of the point, (c, 2).
 Answer = Reconstruction | DegenerateCurvesError
-Fits = Generator["Ask", Answer, "GrowthTrial"]
+Fits = Generator["Request", Answer, "GrowthTrial"]
 Track = Callable[[float], "TrackedContours"]  # It follows half curves to a length, longer at each call.
 
 
-class Ask(NamedTuple):
+class Request(NamedTuple):
     """Contours to be fitted: with the caller's options or, while `growing`, by "bayes"."""
 
     contours: list[Contour]
@@ -251,7 +251,7 @@ def _seed(track: Track, step: float, trials: list[GrowthTrial]) -> Fits:
 def fit_trial(tracked: TrackedContours, counts: Counts) -> Fits:
     """The fit of these numbers of contacts. It takes as few of them as suffice in most cases."""
     stride = stride_of(counts)
-    r = yield Ask(tracked.shortened(counts, stride), growing=True)
+    r = yield Request(tracked.shortened(counts, stride), growing=True)
     if isinstance(r, DegenerateCurvesError):
         raise r
     spread = r.mean_height_std / (tracked.largest_std or MAX_STD * r.radius)

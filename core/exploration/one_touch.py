@@ -12,14 +12,14 @@ from ..contours.contour import EXTENT, UNEXPLAINED, Contour, SamplingPlane
 from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
-from .growth import MOST_STEPS, STRETCH, Answer, Ask, Counts, GrowthTrial, Track, TrackedContours, grown
+from .growth import MOST_STEPS, STRETCH, Answer, Counts, GrowthTrial, Request, Track, TrackedContours, grown
 from .options import ExplorationOptions
 from .sampling_density import CONTACT_COUNTS, MIN_HALF_CONTACTS, spacing, suffices
 from .taps import Tapped, adjacent_half_curves
 
 HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed --base).
 FINER = 8.0  # Steps are shorter by this factor if curves have too few contacts (benchmarks.atlas --shapes).
-# Half curves beside a contradiction, or all those of a touch in doubt, are shortened by this factor at once
+# Half curves next to a contradiction, or all those of a touch in doubt, are shortened by this factor at once
 SHORTER = 1.15  # (benchmarks.real --only taps),
 LEAST_SHARE = 0.25  # but not all of them to less than this share (benchmarks.real --only automatic).
 
@@ -42,7 +42,7 @@ class Exploration:
     stds: tuple[float, ...] = ()
 
 
-Steps = Generator[Ask, Answer, Exploration]
+Steps = Generator[Request, Answer, Exploration]
 Sampled = tuple[list[Contour], float, Reconstruction | None]  # contours, their step, their fit if known
 
 
@@ -187,7 +187,7 @@ class Touch:
         steps = automatic if self.options.step is None else [self.options.step]
         for longest in dict.fromkeys(steps):
             contours, step, known = at(longest)
-            r = known or (yield Ask(contours))
+            r = known or (yield Request(contours))
             if isinstance(r, DegenerateCurvesError):
                 if longest == steps[-1]:
                     raise r
@@ -208,7 +208,7 @@ class Touch:
         counts = tracked.whole // 2 * 2
         while True:
             contours = [*found.contours, *tracked.shortened(counts, 2)]
-            r = yield Ask(contours)
+            r = yield Request(contours)
             if isinstance(r, DegenerateCurvesError):
                 raise r
             misfits = tracked.misfits(counts, r)

@@ -19,7 +19,7 @@ from ..reconstruction.options import FitOptions
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.start import Given
 from ..reconstruction.strokes import gathered
-from .growth import Answer, Ask
+from .growth import Answer, Request
 from .one_touch import Exploration, Steps, Touch
 from .options import ExplorationOptions
 from .taps import tapped
@@ -104,7 +104,7 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
     found: dict[int, Exploration | ValueError] = {}
     answers: dict[int, Answer | None] = dict.fromkeys(range(len(steps)))
     while answers:
-        requests: dict[int, Ask] = {}
+        requests: dict[int, Request] = {}
         for i, answer in answers.items():
             try:
                 requests[i] = steps[i].send(answer)  # type: ignore[arg-type]
@@ -115,7 +115,7 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
             yield
         answers = {}
         for method in dict.fromkeys(("bayes", fit.method)):
-            which = [i for i, ask in requests.items() if ("bayes" if ask.growing else fit.method) == method]
+            which = [i for i, r in requests.items() if ("bayes" if r.growing else fit.method) == method]
             options = replace(fit, method=method)
             touches = [Given(requests[i].contours, *gathered(())) for i in which]
             if which:

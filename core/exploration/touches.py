@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A touch that chooses its own size: curves as long as a patch can be trusted, as many contacts as help.
 
-Beside the paper. Half curves grow outward from the reference point like the regions of a segmentation
+Not in the paper. Half curves grow outward from the reference point like the regions of a segmentation
 by surface fitting: fit, go on where the fit explains the contacts, fit again (growth.py).
 """
 

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Total absolute Gaussian curvature against the contacts: the objective (9) and two minimizations (IV-B).
 
-lambda stays as it is given. The paper updates it from step to step, but does not say how, and its text takes
-the gradient of f + lambda g although (9) is g + lambda f.
+lambda stays as it is given. The paper updates it from step to step by a rule that it does not state, and its
+text takes the gradient of f + lambda g although (9) is g + lambda f.
 """
 
 from typing import NamedTuple
@@ -118,21 +118,25 @@ def _newton_step(
     rounding: float,
     damping: float,
 ) -> tuple[Array, _Fields, float, float]:
-    """A Levenberg-damped Newton step: coefficients, fields, value, and the damping of the next step.
+    """A Newton step with Levenberg's damping, which lowers the objective or is none.
 
     whitening : (terms, terms), W with W' M W = I for the metric M
+    a, at, value : the coefficients, and the fields and the objective there
+    rounding : of the objective's kinks, so that it has derivatives
+    damping : what is added to the eigenvalues; larger ones make shorter steps
 
-    The absolute eigenvalues of W' H W take the place of those of the Hessian, which may be indefinite.
+    Returns a, at and value after the step, and the damping of the next one. The Hessian H may be indefinite,
+    so the eigenvalues of W' H W count by their absolute values.
     """
-    bends, axes = np.linalg.eigh(whitening.T @ objective.hessian(at, rounding) @ whitening)
+    curvatures, axes = np.linalg.eigh(whitening.T @ objective.hessian(at, rounding) @ whitening)
     axes = whitening @ axes
     along = objective.gradient(at, rounding) @ axes
     while True:
-        lengths = along / (np.maximum(np.abs(bends), 1e-9) + damping)
+        lengths = along / (np.maximum(np.abs(curvatures), 1e-9) + damping)
         trial = a - axes @ lengths
         there = objective.fields(trial)
         trial_value = objective.value(there, rounding)
-        expected = float(lengths @ (along - 0.5 * bends * lengths))
+        expected = float(lengths @ (along - 0.5 * curvatures * lengths))
         if trial_value < value:
             quick = value - trial_value > 0.7 * expected
             return trial, there, trial_value, damping * (0.1 if quick else 2.0)

@@ -191,7 +191,11 @@ def _derivative_matrix(powers: int, order: int) -> Array:
 
 
 def _newton_step(surface: HeightField, foot: Array, q: Array) -> Array:
-    """The steps -H^-1 g for half the squared distance, (n, 2); H is without z'' if it is not positive."""
+    """Newton steps (n, 2) of places `foot` (n, 2) on a surface toward those nearest to points q (n, 3).
+
+    They are -H^-1 g, by the gradient and the Hessian of half the squared distance. Where H is not positive
+    definite, it is without the second derivatives of the height, as in Gauss-Newton.
+    """
     d = surface.derivatives(*foot.T)
     residual = d.z - q[:, 2]
     gx, gy = foot[:, 0] - q[:, 0] + residual * d.x, foot[:, 1] - q[:, 1] + residual * d.y

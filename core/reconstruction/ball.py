@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Contacts of a ball whose center was recorded: the surface of the centers, moved inward along its normals.
 
-Beside the paper. Centers lie on the parallel surface at the distance r, the ball's radius, which has the same
+Not in the paper. Centers lie on the parallel surface at the distance r, the ball's radius, which has the same
 normals and 1/kappa = 1/kappa_center + r. Contacts leave the plane of their curve. Along an edge that is
 sharper than the ball, centers bend by 1/r, and over a hollow that is sharper they have a kink.
 """
@@ -19,7 +19,7 @@ from ..contours.contour import Contour
 from ..contours.local_geometry import DegenerateCurvesError
 from .result import Reconstruction
 
-# Slopes of centers are those of parabolas through so many, or this part of them, on either side.
+# Slopes of centers are those of parabolas through SIDE centers, or a SIDES-th of all, on either side.
 SIDE, SIDES = 8, 6
 KINK, KINK_STDS = 0.1, 5.0  # They have a kink if slopes differ by more, and by more of their deviations.
 

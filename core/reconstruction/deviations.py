@@ -21,9 +21,9 @@ def mean_height_stds(results: Sequence[Reconstruction]) -> list[float]:
 
 
 def with_height_stds(results: Sequence[Reconstruction]) -> list[Reconstruction]:
-    """Reconstructions that know their mean_height_std already; status and message need it first."""
+    """Reconstructions with `known_height_std`, computed for all at once; status and message need it first."""
     stds = mean_height_stds(results)
-    # Those with a process know it already, and more than the mean.
+    # For those with a process the mean has been computed from `node_stds`, which they keep.
     pairs = zip(results, stds, strict=True)
     return [replace(r, known_height_std=std) if not r.posterior.amplitude else r for r, std in pairs]
 

@@ -26,7 +26,7 @@ from .stacks import fitted_stack
 from .start import Given
 from .strokes import gathered
 
-STACK = 4000  # So many contacts at once fit into a processor's cache (benchmarks.speed).
+STACK = 4000  # The number of contacts that fit into a processor's cache at once (benchmarks.speed).
 
 
 def reconstruct(
@@ -60,7 +60,7 @@ def reconstruct(
     solver : for "tagc", "fast" (Newton, from the quadric) or "descent" (the paper's, from its start)
 
     Raises ValueError for bad arguments, DegenerateCurvesError for contours that cannot carry the
-    method. The status of the result tells a fit in doubt.
+    method. A fit in doubt has another status than "ok".
 
     >>> s, azimuths = np.linspace(-0.5, 0.5, 21), np.radians([0, 60, 120])  # meridians of the unit ball
     >>> meridian = lambda a: Contour(np.stack([np.sin(s) * np.cos(a), np.sin(s) * np.sin(a), np.cos(s)], 1))
@@ -118,7 +118,7 @@ def fitted(
     # A stack has room for its longest contour in all places, so touches of similar size go together.
     sizes = [touch.size for touch in touches]
     results: dict[int, Reconstruction | DegenerateCurvesError] = {}
-    # Measured normals of some would cost time in the fits of all, and strokes alone start differently.
+    # Measured normals of some cost time in the fits of all, and touches without contours start differently.
     kinds = [(has_measured_normals(touch.contours), touch.strokes_only) for touch in touches]
     for kind in dict.fromkeys(kinds):
         order = [i for i in range(len(touches)) if kinds[i] == kind]

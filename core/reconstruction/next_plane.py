@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where to touch next: the sampling plane whose contour would tell most. Beside the paper."""
+"""Where to touch next: the sampling plane whose contour would lower the variance most. Not in the paper."""
 
 import math
 from collections.abc import Callable
@@ -17,7 +17,7 @@ TRIED = np.radians(np.arange(0.0, 180.0, 3.0))
 COARSE_STRIDE = 5  # Each fifth of them is tried first, with contours of FEW_CONTACTS,
 FEW_CONTACTS = 8
 NEARBY = np.arange(-(COARSE_STRIDE // 2), COARSE_STRIDE // 2 + 1)  # and then those next to the best.
-TELLING_CONTACTS = 24  # More contacts tell no more of a contour's seven terms than as many with less noise.
+MOST_CONTACTS = 24  # More contacts show a contour's seven terms no better than this many with less noise.
 
 
 def suggest_plane(
@@ -38,16 +38,19 @@ def suggest_plane(
     covariances = r.posterior.covariances_with(points / r.radius)
     widening = r.widening(r.domain.node_places) ** 2
 
-    def lost(azimuths: NDArray[np.intp], most: int) -> Array:
-        """What a contour at each of k azimuths takes off the variances at n points, (k, n), in L^2."""
+    def reduction(azimuths: NDArray[np.intp], most: int) -> Array:
+        """By how much a contour at each of k azimuths would lower the height variance at n points, (k, n).
+
+        It is in units of L^2. At most `most` contacts stand for those of a contour, with less noise then.
+        """
         count = min(wanted, most)
         noise = float(r.posterior.noise) ** 2 * count / wanted
-        return widening * _lost(covariances, TRIED[azimuths % len(TRIED)], count, noise)
+        return widening * _variance_reduction(covariances, TRIED[azimuths % len(TRIED)], count, noise)
 
     tried = np.arange(0, len(TRIED), COARSE_STRIDE)
-    near = tried[[np.argmax(lost(tried, FEW_CONTACTS) @ weights)]] + NEARBY
-    best = near[[np.argmax(lost(near, FEW_CONTACTS) @ weights)]] % len(TRIED)
-    variance = np.maximum((r.node_stds / r.radius) ** 2 - lost(best, TELLING_CONTACTS)[0], 0.0)
+    near = tried[[np.argmax(reduction(tried, FEW_CONTACTS) @ weights)]] + NEARBY
+    best = near[[np.argmax(reduction(near, FEW_CONTACTS) @ weights)]] % len(TRIED)
+    variance = np.maximum((r.node_stds / r.radius) ** 2 - reduction(best, MOST_CONTACTS)[0], 0.0)
     azimuth, (d1, _, n) = float(TRIED[best[0]]), r.frame.axes.T
     direction = SamplingPlane(azimuth).axes(n, d1)[:, 0]
     if outward is not None:
@@ -56,13 +59,15 @@ def suggest_plane(
     return plane, r.radius * float(weights @ np.sqrt(variance))
 
 
-def _lost(
+def _variance_reduction(
     covariances: Callable[[Array], tuple[Array, Array]], azimuths: Array, count: int, noise: float
 ) -> Array:
-    """What contours at azimuths (k,), of `count` contacts with this noise^2, take off the variances, (k, n).
+    """By how much a contour at each azimuth (k,) would lower the height variances at n points, (k, n).
 
-    The heights of a contour have a `covariance`, and `shared` with those at the n points. It takes the
-    diagonal of shared' covariance^-1 shared off their variances.
+    count, noise : the number of contacts of each contour, and their noise^2
+
+    Contacts whose heights have the covariance C, and the covariances S with the heights at the points, lower
+    the variances at these by the diagonal of S' C^-1 S (Rasmussen and Williams 2006, equation 2.26).
     """
     directions = np.column_stack([np.cos(azimuths), np.sin(azimuths)])
     shared, covariance = covariances(np.linspace(-1.0, 1.0, count)[:, None] * directions[:, None])

@@ -21,7 +21,7 @@ class FitOptions:
     noise : the standard deviation that a contact has at least, a length; None for the contours' own
     weight : lambda L^2 of "tagc" and "quadratic-variation"; None for 1000 and 1e5
     solver : one of SOLVERS
-    radius : contacts of strokes alone count up to this distance from the point; None for all
+    radius : without contours, contacts count up to this distance from the point; None for all
 
     Raises ValueError for bad ones.
     """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A patch with its frame, and everything that may be asked of it."""
+"""A patch with its frame, and all results that follow from it."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -41,7 +41,7 @@ class Reconstruction:
     """A patch around a reference point, its contacts and all results, in the caller's unit.
 
     geometry : the surface that was found: the posterior's mean for "bayes", `patch` for other methods
-    patch : equation (1) of the degree asked for, in the frame
+    patch : equation (1) of the requested degree, in the frame
     contours : the fitted contours, in the world
     strokes : the other fitted contacts, in the world, (n, 3); means of neighbors if there are many
     noise : noise floor, the standard deviation that a contact has at least, in units of L
@@ -51,7 +51,7 @@ class Reconstruction:
     known_height_std : mean_height_std, if it is known already
     known_curves : the contours as Curves of one touch, in the world, if they are known already
 
-    All else is computed from these when it is asked for, so contours and strokes are copies that cannot be
+    All else is computed from these when it is first used, so contours and strokes are copies that cannot be
     written to.
     """
 
@@ -127,7 +127,7 @@ class Reconstruction:
         return self.geometry.height(x, y)
 
     def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Standard deviation of the height at local (x, y), in their shape, including blind directions."""
+        """Standard deviation of the height at local (x, y), in their shape, with what contacts leave open."""
         points = np.column_stack([np.ravel(v) for v in np.broadcast_arrays(x, y)])
         outward = np.ones(len(points))
         if self.posterior.amplitude:  # Otherwise it makes no difference.
@@ -145,7 +145,7 @@ class Reconstruction:
     def widening(self, outward: Array) -> Array:
         """The factor (n,) of a process's deviations at these shares (n,) of the domain's radius.
 
-        Near the point, where curves meet, real surfaces are smoother than their covariance says, and near the
+        Near the point, where curves meet, real surfaces are smoother than by their covariance, and near the
         rim they are rougher. The mean over the domain is 1.
         """
         near = NEAR_POINT if self.posterior.amplitude else 1.0
@@ -226,14 +226,14 @@ class Reconstruction:
         return math.sqrt(variance) / self.radius**2
 
     @cached_property
-    def blind(self) -> int:
+    def null_space_dimension(self) -> int:
         """Number of directions among the coefficients of degree 1 to d that the contacts do not show."""
         return self.posterior.null_space_dimension(self.patch.degree)
 
     @property
-    def blind_share(self) -> float:
-        """The share of the coefficients that `blind` counts."""
-        return self.blind / terms_to(self.patch.degree)
+    def null_space_share(self) -> float:
+        """`null_space_dimension` as a share of the number of these coefficients."""
+        return self.null_space_dimension / terms_to(self.patch.degree)
 
     @cached_property
     def _departures(self) -> Array:
@@ -301,7 +301,7 @@ class Reconstruction:
 
     @property
     def message(self) -> str:
-        """The status in a sentence with advice, and whether directions are undefined or blind."""
+        """The status in a sentence with advice, and what the contacts leave undetermined."""
         return self._verdict[1] + notes(self)
 
     @cached_property
@@ -310,7 +310,7 @@ class Reconstruction:
 
     @cached_property
     def curve_contradiction(self) -> tuple[float, float]:
-        """The number of deviations, and the share of L, by which a curve is off what the others tell."""
+        """The number of deviations, and the share of L, by which a curve is off what the others show."""
         if self.method != "bayes":
             return 0.0, 0.0
         counted = [distances_from_point(contour.points - self.frame.origin)[1] for contour in self.contours]

@@ -89,7 +89,7 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
         contours=contours,
         noise=number("noise", _of(d, "noise"), least=0.0),
         method=method,
-        converged=bool(_of(d, "converged")),
+        converged=_converged(_of(d, "converged")),
         strokes=np.empty((0, 3)) if strokes is None else finite_array("strokes", strokes, (None, 3), LARGEST),
         taps=_taps(d.get("taps")),
         known_height_std=number("mean_height_std", _of(d, "mean_height_std"), least=0.0),
@@ -105,6 +105,12 @@ def _of(d: Any, key: str) -> Any:
     if key not in d:
         raise ValueError(f"{key}: expected it in the dict of a reconstruction, got none")
     return d[key]
+
+
+def _converged(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise ValueError(f"converged: expected True or False, as to_dict gives it, got {shown(value)}")
+    return value
 
 
 def _geometry(d: Any, surface: SurfacePosterior | MongePatch) -> Geometry:

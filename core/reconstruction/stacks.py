@@ -37,7 +37,7 @@ class _Fit(NamedTuple):
 def fitted_stack(
     points: Array, touches: Sequence[Given], outward: Array, options: FitOptions
 ) -> list[Reconstruction | DegenerateCurvesError]:
-    """The results of touches whose arguments are checked, and which are all of strokes alone or none is."""
+    """The results of touches whose arguments are checked; either all of them have contours or none has."""
     if touches[0].strokes_only:
         start, contours, errors = strokes_start(points, touches, outward, options.noise, options.radius)
     else:
@@ -81,13 +81,13 @@ def _fit(start: Start, options: FitOptions) -> _Fit:
 
 
 def _with_processes(start: Start, fit: _Fit, posteriors: SurfacePosterior, weights: Array) -> _Fit:
-    """The joint fit in unit radius; where contacts ask for a process, with it and in its frame."""
+    """The joint fit in unit radius; where evidence favors a process, with it and in its frame."""
     points, axes, radii, contacts = fit[:4]
     if start.strokes_only:
         offset = (weights * posteriors.residuals(contacts)).sum(axis=1) / weights.sum(axis=1)
         contacts[..., 2] -= offset[:, None]
         points = points + (radii * offset)[:, None] * axes[..., 2]
-    # The radius is the distance of the farthest contact of curves, or of strokes alone.
+    # The radius is the distance of the farthest contact of curves, or of strokes where there are no curves.
     places = contacts.shape[1] if start.strokes_only else start.curves.present[0].size
     farthest = np.hypot(contacts[..., 0], contacts[..., 1])[:, :places].max(axis=1)
     radii, contacts, posteriors = (
@@ -157,7 +157,7 @@ def _curves(start: Start, fit: _Fit, i: int) -> Curves:
 
 
 def _domain(curves: Curves, strokes: Array, contours: Sequence[Contour]) -> Domain | DegenerateCurvesError:
-    """The domain of the contours, or of strokes alone, in unit radius; or why there is none."""
+    """The domain of the contours, or of strokes where there are none, in unit radius; or why it fails."""
     try:
         return domain_of(curves, contours) if contours else hull_domain(strokes[:, :2], 1.0)
     except ValueError:

@@ -91,7 +91,7 @@ Started = tuple[Start | None, list[list[Contour]], list[DegenerateCurvesError | 
 
 
 def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: float | None) -> Started:
-    """The start of fits to contours with strokes beside them, the thinned contours, and errors."""
+    """The start of fits to contours, with or without strokes; the thinned contours; and errors."""
     thin = [[thinned(c, point) for c in touch.contours] for point, touch in zip(points, given, strict=True)]
     touches = [[contour for contour, _ in c] for c in thin]
     curves = curves_through(*stacked(points, touches))
@@ -200,7 +200,7 @@ def _over(curves: Curves, contours: Sequence[Contour], strokes: Array) -> NDArra
 def strokes_start(
     points: Array, given: Sequence[Given], outward: Array, noise: float | None, radius: float | None
 ) -> Started:
-    """What `curves_start` gives, for strokes alone."""
+    """What `curves_start` gives, for touches of strokes without contours."""
     frames = [
         first_frame(touch.strokes - point, up, radius)
         for point, touch, up in zip(points, given, outward, strict=True)

@@ -12,22 +12,22 @@ from ..bayes.posterior import CONFIDENCE, terms_to
 from ..contours.contour import SURFACE_ENDS, UNEXPLAINED
 from ..patch.domain import AT_POINT
 
-# benchmarks.stability chose these, and benchmarks.real LIKELY and what taps say. A fit is in doubt beyond
+# benchmarks.stability chose these, and benchmarks.real LIKELY and those of taps. A fit is in doubt beyond
 # them.
 DOUBTFUL_STD = 0.02  # Mean deviation of the height over the domain, as a share of the radius.
 DOUBTFUL_WAVES = 0.012  # What a quartic leaves of a rough surface along its curves, as a share of the radius.
-DOUBTFUL_CONDITION = 1e3  # Plain least squares makes noise so many times larger.
+DOUBTFUL_CONDITION = 1e3  # The factor by which plain least squares amplifies noise.
 DOUBTFUL_TURN = math.radians(10.0)  # Angle by which the frame may be off.
 LIKELY = 0.5  # Probability of that angle on a rough surface, whose directions differ at each scale.
 DOUBTFUL_CURVATURE = 0.1  # Deviation of a curvature times the radius: that of curves a quarter as long.
 DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve may miss the point, if it is
 OWN_POINT = 1e-6  # A contact that is nearer to the point, in unit radius, is the point.
-SIGNIFICANT = 5.0  # so many standard deviations as well.
+SIGNIFICANT = 5.0  # this many standard deviations as well.
 # Scatter counts as at least this share of a contact's noise: few contacts may scatter less.
 LEAST_SCATTER = 0.3
 # Angle in radians by which normals contradict the contacts, if it is SIGNIFICANT as well.
 CONTRADICTED = 0.01
-# Angle in radians by which normals are off the curves, if it is so many of their deviations as well.
+# Angle in radians by which normals are off the curves, and the least multiple of their deviation that it is.
 SCATTERED, SCATTERED_DEVIATIONS = 0.15, 3.0
 CONTRADICTING_CURVE = 7.0  # Deviations by which half of a curve is off what the others show.
 DOUBTFUL_FIT = 0.01  # Share of the radius by which half of the contacts are off, beyond their noise.
@@ -101,15 +101,15 @@ def _is_at_edge(r: Judged) -> bool:
 
 
 def notes(r: Judged) -> str:
-    """What else there is to say, whatever the status: sentences, each after a space."""
+    """Further notes, whatever the status: sentences, each after a space."""
     message = ""
     if r.taps is not None and r.taps.missed:
         message += f" {r.taps.missed} of {r.taps.number} taps between the curves feel no surface."
     if r.posterior.is_round:
         message += " The two curvatures are equal within their error, so there are no principal directions."
-    if r.blind:
+    if r.null_space_dimension:
         terms = terms_to(r.patch.degree)
-        message += f" These planes cannot show {r.blind} of the {terms} shape terms."
+        message += f" These planes cannot show {r.null_space_dimension} of the {terms} shape terms."
     return message
 
 
@@ -123,7 +123,7 @@ def _doubts(r: Judged) -> Iterator[str]:
 
 
 def _about_point(r: Judged) -> Iterator[str]:
-    """A point beside the curves makes everything else doubtful, too."""
+    """Whether curves miss the point, which makes everything else doubtful, too."""
     distances, stds = r.misses.T / r.radius
     stds = np.maximum(stds, LEAST_SCATTER * r.noise)
     apart = distances > np.maximum(DOUBTFUL_MISS, SIGNIFICANT * stds)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strokes: contacts that run beside the reference point, and the frame they show where there are no contours.
+"""Strokes: curves that do not pass through the reference point, and the frame that they show by themselves.
 
 A robot that wipes over an object has thousands of them, with noise in all directions, but the fit takes their
 places in the tangent plane for exact. So it gets means of neighbors, in which this noise averages out. Their
@@ -20,21 +20,21 @@ from ..contours.contour import Contour, cross, equal_points
 from ..contours.local_geometry import DegenerateCurvesError
 from ..patch.monge import QUADRIC, QUARTIC, monomials
 
-# benchmarks.robot chose these. There are so many strips of as many means each: with more, the offsets of rows
+# benchmarks.robot chose these. There are STRIPS strips of STRIPS means each: with more, the offsets of rows
 # count as texture.
 STRIPS, LEAST_STRIPS = 10, 6
-ROWS = 4  # A mean consists of contacts of at least so many rows, on average.
-STROKE_CELL = 0.02  # Contacts in a square of this share of the radius tell of one place.
+ROWS = 4  # A mean consists of contacts of at least this many rows, on average.
+STROKE_CELL = 0.02  # Contacts in a square with sides of this share of the radius count as one place.
 FIRST_REACH = 0.5  # The first quadric is fitted within this share of the largest distance, if that suffices.
 DETERMINED = 0.02  # It suffices if the least singular value of its terms, averaged over contacts, is larger.
 OPEN = 1e-3  # Terms of a quartic below this share of the largest singular value are left out.
-STRAY = 2.0  # Contacts so many times as far away as all others do not belong to the surface,
+STRAY = 2.0  # Contacts that are farther away than all others by this factor do not belong to the surface,
 FEW = 0.02  # if they are at most this share of all.
-DECIMALS = 9  # Places of contacts count to so many decimals, so that rounding does not choose.
+DECIMALS = 9  # Places of contacts are compared to this decimal, so that rounding does not choose.
 
 
 class FirstFrame(NamedTuple):
-    """What contacts show alone around a place.
+    """The frame at a place that contacts around it show, without contours.
 
     axes : (3, 3), columns d1, d2, n near to the Darboux frame at the foot of the place
     k1, k2 : curvatures in unit radius
@@ -57,9 +57,9 @@ def gathered(
     """All different contacts of strokes, (n, 3), when each was felt, and the largest noise that one states.
 
     Contacts are in the order of their coordinates, so that no other order makes a difference. Those that
-    follow each other in a stroke have consecutive numbers in the second array, (n,). Repeated contacts, as of
-    contours that are given too, would tell no more. Raises ValueError for strokes of another shape or with
-    numbers that are not finite.
+    follow each other in a stroke have consecutive numbers in the second array, (n,). Repeated contacts, as
+    those of `contours`, would add no information and are left out. Raises ValueError for strokes of another
+    shape or with numbers that are not finite.
     """
     given: list[object] = list_of("strokes", strokes, object)
     if not given:  # In most cases there are only contours, which should not take longer.
@@ -88,9 +88,9 @@ def means(
     """Contacts (n, 3) in unit radius, or strips^2 means of neighbors; the least number of contacts in a mean.
 
     Strips run across the direction `along` (2,). Each mean has an equal share of the area that was felt,
-    because a sensor tells no more of the shape where it dwells. Contacts that follow each other, as `when`
-    says, share the error of their row, so there are fewer strips if rows are far apart. Without `when` they
-    follow each other as they are given.
+    because a sensor that dwells in a place adds nothing about the shape. Contacts with consecutive numbers in
+    `when` (n,) share the error of their row, so there are fewer strips if rows are far apart. Without `when`
+    they are in the order of time.
     """
     n = len(contacts)
     if n <= strips**2:
@@ -117,7 +117,11 @@ def means(
 
 
 def _groups(flat: Array, along: Array, strips: int) -> NDArray[np.intp]:
-    """The group (n,) of each contact (n, 2), such that all groups have equal shares of occupied cells."""
+    """The number, 0 to strips^2 - 1, of the group of each contact (n, 2) of the tangent plane.
+
+    Strips run along the unit vector `along` (2,), and each is cut into as many groups. All groups cover equal
+    areas, which are counted in the squares of the side STROKE_CELL that hold a contact.
+    """
     flat = flat.round(DECIMALS)  # Rows of a raster are equally far along, whatever rounding makes of them.
     run, across = flat @ along, flat[:, 1] * along[0] - flat[:, 0] * along[1]
     # They are the same for either side of the normal, and for either way of d1.
@@ -145,7 +149,7 @@ def _basis(flat: Array) -> Array:
 
 
 def first_frame(r: Array, outward: Array, radius: float | None) -> FirstFrame | DegenerateCurvesError:
-    """What contacts (n, 3) around a place show alone, by a plane and a quadric; or why they carry no fit.
+    """The frame from contacts (n, 3) around a place, by a plane and a quadric; or why they carry no fit.
 
     radius : only contacts within it take part; None for all
 

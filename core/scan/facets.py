@@ -47,7 +47,7 @@ def has_few_facets(
     face_near : the number of the face nearest to a point (3,) of the world
     corners_of : the corners (k, 3) of a face in the world, in order
 
-    Facets that bend into others at sharp edges alone, as those of a cube, are the shape itself.
+    Facets whose edges are all sharp, as those of a cube, are the shape itself.
     """
     shape = cache(lambda face: _facet(corners_of(face)))
     touched: dict[int, Facet] = {}

@@ -160,7 +160,7 @@ def _registered(
     """Rigid motions (m, 3, 4) of least squared distances from the mesh, by Levenberg-Marquardt.
 
     Also the root mean square distances (m,) in units of the radius, and whether the smallest eigenvalue of
-    J'J is so low that noise alone may shift the contacts by SAME_PLACE or SAME_TURN, (m,).
+    J'J is so low that noise may shift the contacts by SAME_PLACE or SAME_TURN, (m,).
     """
     from scipy.spatial.transform import Rotation
 

@@ -24,7 +24,7 @@ from ..touch.wording import registration_summary
 from .verify_operator import chosen_mesh
 
 POSES = 5
-HURRY = 0.02  # After so many seconds it is checked again whether the search is done.
+HURRY = 0.02  # The seconds after which it is checked again whether the search is done.
 
 
 class Search:

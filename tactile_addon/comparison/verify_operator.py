@@ -21,7 +21,7 @@ from ..touch.touch_report import TouchReport, judgment
 from ..touch.types import Array, Object, Outcome
 from .verification_wording import verification_summary
 
-VERTICES_AT_ONCE = 2000  # A step looks at so many vertices.
+VERTICES_AT_ONCE = 2000  # A step looks at this many vertices.
 
 
 class Verification:

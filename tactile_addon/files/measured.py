@@ -37,13 +37,13 @@ def read(paths: Iterable[str | Path], unit: str, meters: float, whole: bool = Fa
     contours, strokes, points, directions = [], [], [], []
     found = "" if unit in ("FILE", "NONE") else unit
     for path in paths:
-        curves, named, point, outward, beside = contact_file.read(path)
+        curves, named, point, outward, off_point = contact_file.read(path)
         named = {"FILE": named, "NONE": ""}.get(unit, unit)
         factor = core.UNIT_METERS[named] / meters if named else 1.0
         # Quotients such as 1 / 0.1 are not exact, but a file in the world's unit must stay as it is.
         factor = 1.0 if math.isclose(factor, 1.0, rel_tol=1e-6) else factor
         contours += [_scaled(curve, factor) for curve in curves]
-        strokes += [_scaled(stroke, factor) for stroke in beside]
+        strokes += [_scaled(stroke, factor) for stroke in off_point]
         points += [] if point is None else [[factor * x for x in point]]
         directions += [] if outward is None else [outward]
         found = named or found
@@ -133,10 +133,10 @@ def fit(
 ) -> Touched:
     """The patch that core.Contacts show, as a Touched without a surface.
 
-    point : where the curves meet, exactly; None for the point of the file, or core.common_point. For strokes
-        alone, a place among them; None for the point of the file, or their mean
+    point : where the curves meet, exactly; None for the point of the file, or core.common_point. Without
+        curves, a place among the strokes; None for the point of the file, or their mean
     all_strokes : whether curves count as strokes, too
-    radius : for strokes alone, contacts within this distance are used; 0 for all
+    radius : without curves, contacts of strokes within this distance are used; 0 for all
     outward : None for the direction of the file or the mean of the normals. Without any, it is the side to
         which the surface bulges, or +z if it is flat; `flip` takes the other side
     noise, normal_std : in the contours' unit and in radians; 0 for those of the file. If the file has no

@@ -11,7 +11,7 @@ import numpy as np
 from ..touch.types import Object
 from . import mesh_numbers, ply_contacts, whole_file
 
-HEADER = 1 << 16  # The header of a .ply ends within so many bytes.
+HEADER = 1 << 16  # The header of a .ply ends within this many bytes.
 INCOMPLETE = "Blender has not written all of it"
 # The operators that import files with these endings, and their options.
 IMPORTS = {
@@ -45,7 +45,7 @@ def add(path: Path, empty: bool = False) -> Object:
     there = set(bpy.data.objects)
     operator, options = IMPORTS[path.suffix.lower()]
     try:
-        # Importers ask for a window, and after `blender -b` none is current.
+        # Importers need a window, and after `blender -b` none is current.
         with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
             getattr(bpy.ops.wm, operator)(filepath=str(path.absolute()), **options)
     except RuntimeError as error:

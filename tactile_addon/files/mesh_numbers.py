@@ -11,7 +11,7 @@ from ...core.contact_data.rows import POINT_COLUMNS
 from ..touch.types import Array
 from . import ply_contacts
 
-STL_HEAD = 84  # The head of a binary .stl has so many bytes, the last four of which number its triangles.
+STL_HEAD = 84  # The bytes of the head of a binary .stl; the last four are the number of triangles.
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 PLY_LINE = 65_000  # Longer lines in a .ply would end Blender.
 AFTER_WORD = (1, 2, 3)  # These words follow the one that begins the line of a vertex.
@@ -68,7 +68,7 @@ def _of_lines(lines: Sequence[bytes], places: Sequence[int]) -> int:
 def _is_bad(words: Sequence[bytes], places: Sequence[int]) -> bool:
     try:
         row = [words[place] for place in places]
-        # Python alone takes 1_0 for 10.
+        # Only Python takes 1_0 for 10.
         return any(b"_" in word for word in row) or _of_numbers(np.array([list(map(float, row))])) > 0
     except (ValueError, IndexError):
         return True

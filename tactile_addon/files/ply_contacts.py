@@ -19,7 +19,7 @@ from ..touch.types import Array
 
 # Names and types of the properties of an element; a list has the types of its length and of its items.
 Fields: TypeAlias = list[tuple[str, Any]]
-PLY_ROWS = 1000  # So many rows of a .ply are read together.
+PLY_ROWS = 1000  # This many rows of a .ply are read together.
 PLY_TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
     **dict.fromkeys(("uchar", "uint8"), "u1"),
@@ -83,7 +83,7 @@ def vertex_rows(name: str, data: bytes) -> tuple[Any, Fields, int]:
 
 
 def _after(data: bytes, start: int, fields: Fields, count: int) -> int:
-    """The place after so many rows with these fields from `start` on, or one beyond the data."""
+    """The place after `count` rows with these fields from `start` on, or one beyond the data."""
     lists, skipped = [], 0  # The bytes before each list, and the types of its length and of its items.
     for _, kind in fields:
         if isinstance(kind, str):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that are written completely or not at all: beside the old file, which the new one then replaces."""
+"""Files that are written completely or not at all: next to the old file, which the new one then replaces."""
 
 import os
 import secrets
@@ -11,14 +11,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 UNFINISHED = ".unfinished"  # This is before the suffix of files that are being written.
-STALE = 3600.0  # Whoever has not written to such a file for so many seconds was killed.
+STALE = 3600.0  # A process that has not written to such a file for this many seconds was killed.
 
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
     """The path of a file that replaces `path` once it is written, at the end of the block.
 
-    Raises OSError, with a sentence, if that fails. The old file is then as it was, and nothing is beside it.
+    Raises OSError, with a sentence, if that fails. The old file is then as it was, and nothing is next to it.
     If this process is killed, the hidden file stays until `path` is written another time, an hour later.
     """
     if Path(path).exists() and not Path(path).is_file():

@@ -16,7 +16,7 @@ from ..scene import patch_record
 from ..touch.types import Array, Object
 
 BASE = "tactile_base"  # A patch's custom property: its target's matrix and its own when it was touched.
-SEAT = 20  # So many numbers tell the place in the target, directions there, and the target's scale and shear.
+SEAT = 20  # The count of numbers for the place in the target, directions there, and its scale and shear.
 CLOSE = 1e-5  # A smaller change of a number, or of a length as a share of the extent, is rounding of float32.
 
 
@@ -102,7 +102,7 @@ def seat(probe: Object, extent: float) -> list[float]:
     return kept.tolist() if is_there else now.tolist()
 
 
-@lru_cache(maxsize=16)  # It is asked for several times in a row whenever something has changed.
+@lru_cache(maxsize=16)  # It is needed several times in a row whenever something has changed.
 def _seat(*matrices: float) -> Array:
     """SEAT numbers from the world matrices of a target and a probe, 16 each; NaN if the target is flat."""
     to_world, place = np.reshape(matrices, (2, 4, 4))

@@ -24,11 +24,11 @@ from . import anchor, deleted
 from .probe import forget_targets, is_probe, lock_of, probe_of, record_of, targets
 from .touch_again import is_outdated, may_be_outdated, measure_shape, stand_by, update
 
-SETTLE = 0.25  # A gesture counts as ended after so many seconds without a change.
-EVENT_SLICE = 0.2  # In a window, work between two events takes so many seconds.
-CHEAP = 0.05  # A touch that takes no more seconds is made in every frame of an animation.
+SETTLE = 0.25  # A gesture counts as ended after this many seconds without a change.
+EVENT_SLICE = 0.2  # In a window, work between two events takes this many seconds.
+CHEAP = 0.05  # A touch that takes at most this many seconds is made in every frame of an animation.
 
-_unsure = True  # Whether any patch may differ from what its inputs ask for, as after undo.
+_unsure = True  # Whether any patch may be that of other inputs than it has, as after undo.
 _seen = None  # The scene and view layer that were looked at last.
 
 
@@ -64,7 +64,7 @@ def _bring_up_to_date(depsgraph: bpy.types.Depsgraph, dearest: float) -> None:
         reshaped: dict[Any, int | None] = {
             u.id.original: None for u in depsgraph.updates if u.is_updated_geometry
         }
-        if unsure:  # It may have been edited when no handler was told, as while the extension was off.
+        if unsure:  # It may have been edited when no handler ran, as while the extension was off.
             reshaped |= {probe.tactile_probe.target: None for probe in concerned}
         end = perf_counter() + EVENT_SLICE
         for probe in (probe for probe in concerned if lock_of(probe) is None):

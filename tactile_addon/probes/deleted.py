@@ -16,7 +16,7 @@ from .probe import DIGEST, is_result
 
 # Datablocks that drop a deleted object by themselves.
 WINDOW_DATA = bpy.types.Scene | bpy.types.Screen | bpy.types.WindowManager | bpy.types.WorkSpace
-LATER = 0.25  # After so many seconds it is checked again whether a gesture has ended.
+LATER = 0.25  # The seconds after which it is checked again whether a gesture has ended.
 _deleted: set[int] = set()  # The session_uids of deleted targets.
 contour_owners: dict[int, int] = {}  # By those of contours, those of their last patches.
 
@@ -50,7 +50,7 @@ def _follow(probe: Object, target: Object) -> None:
     """Follows a library's object, which is not deleted if it is in no scene of this file.
 
     Its override may be in a scene, or it may be in one of its own file. The override takes the place of the
-    object, unless it was made for the probe's sake alone.
+    object, unless it was made only because the probe refers to the object.
     """
     if target.override_library is not None:
         there = [target.override_library.reference]

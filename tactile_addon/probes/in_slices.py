@@ -16,7 +16,7 @@ from .operators import report_error, target_object
 
 # These are seconds.
 FIRST_SLICE = 0.2  # Work that takes no longer is done without slices.
-TIMER_SLICE, LONGEST_SLICE = 0.03, 0.25  # Work between two events takes so long, or as long as a slow redraw.
+TIMER_SLICE, LONGEST_SLICE = 0.03, 0.25  # The least and longest work between two events: as a redraw takes.
 NEXT = 0.01  # The next slice begins after this time.
 SAY = 1.0  # Without a window, a line of progress is printed each time.
 Progress: TypeAlias = tuple[str, float | None]  # Words, and the share that is done, if it is known.
@@ -87,7 +87,7 @@ class InSlices(OperatorMixin):
             return report_error(self, error)
 
     def _go_on(self, context: bpy.types.Context) -> Outcome:
-        """Makes the window do the steps."""
+        """Starts a timer in the window, whose events do the rest of the steps in `modal`."""
         self._timer = context.window_manager.event_timer_add(NEXT, window=context.window)
         context.workspace.status_text_set(_status(self.stop, *self._done()))
         context.window_manager.modal_handler_add(self)

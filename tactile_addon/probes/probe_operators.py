@@ -18,7 +18,7 @@ from ..touch.wording import added_planes, verdict
 from . import probe, touch_again
 from .operators import has_patch, is_in_object_mode, is_unlocked, polls, report_error, waiting
 
-SUBDIVISIONS = 3  # A target gets so many levels at once,
+SUBDIVISIONS = 3  # A target gets this many levels at once,
 MOST_FACES = 500_000  # as long as it has no more faces then.
 
 

@@ -20,7 +20,7 @@ from . import anchor
 from .probe import DIGEST, patch_of, record_of
 
 NO_SHAPE = " 00000000"  # The end of settings.shape for a mesh that cannot be touched.
-VERTICES = 1000  # At most so many vertices around are compared with the patch; a quarter or more lie over it.
+VERTICES = 1000  # At most this many vertices around the patch are compared; a quarter or more lie over it.
 
 
 def _put(probe: Object, touched: Touched) -> None:
@@ -165,7 +165,7 @@ def may_be_outdated(probe: Object, there: Container[Object]) -> bool:
 
 
 def is_outdated(probe: Object, depsgraph: bpy.types.Depsgraph) -> bool:
-    """Whether the patch differs from what the inputs ask for, by the digests of probe and patch."""
+    """Whether the patch is that of other inputs than the probe has, by the digests of both."""
     (touched, name), made = _signed(probe.tactile_probe), _made(probe)
     meshes = patch_object.meshes(patch_of(probe))
     if name != probe.name and (not meshes or any(mesh.users > 1 for mesh in meshes)):
@@ -220,7 +220,7 @@ def measure_shape(
 ) -> None:
     """Keeps the checksum of the target, computed anew if the target is one of the `reshaped` objects.
 
-    reshaped : a dict that gets the checksum of each object that is asked for, so that it is computed once
+    reshaped : a dict that gets the checksum of each object that is needed, so that it is computed once
     """
     target, reshaped = settings.target, {} if reshaped is None else reshaped
     if target is None or (settings.shape.startswith(f"{target.session_uid} ") and target not in reshaped):

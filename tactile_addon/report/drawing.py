@@ -11,7 +11,7 @@ from ..scene.colors import shades
 from ..touch.types import Array
 
 PIXELS = 320  # The width and height of a picture.
-BINS, BAR_WIDTH, HEIGHT = 41, 12, 150  # A histogram has so many bars, this wide and high at most.
+BINS, BAR_WIDTH, HEIGHT = 41, 12, 150  # The number of bars of a histogram, their width and largest height.
 
 
 def triangles(points: Array, corners: Array, colors: Array, marks: ArrayLike = ()) -> str:

@@ -47,7 +47,7 @@ def words(text: str) -> str:
 
 
 def swatch(color: Sequence[float], text: str) -> str:
-    """A box of a color, whose parts are from 0 to 1, with words beside it."""
+    """A box of a color, whose parts are from 0 to 1, with words next to it."""
     red, green, blue = (round(255.0 * part) for part in color[:3])
     style = f"border-left: 1rem solid rgb({red}, {green}, {blue}); padding-left: .5rem"
     return f'<p style="{style}">{escape(text)}</p>'

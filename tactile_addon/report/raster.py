@@ -12,9 +12,9 @@ import numpy as np
 from ..touch.types import Array
 from . import drawing
 
-PIXELS, BORDER = 480, 4  # A picture has so many pixels on each side, so many of them free around its mesh.
-APART = 0.7  # Samples of a triangle are at most so many pixels apart.
-AT_ONCE = 500_000  # So many samples fit into memory at once.
+PIXELS, BORDER = 480, 4  # The pixels on each side of a picture, and the free ones around its mesh.
+APART = 0.7  # The largest distance, in pixels, between samples of a triangle.
+AT_ONCE = 500_000  # The number of samples that fit into memory at once.
 
 
 def picture(points: Array, depths: Array, corners: Array, colors: Array) -> str:

@@ -43,8 +43,8 @@ class TACTILE_OT_export_report(ObjectExport, bpy.types.Operator):
     @staticmethod
     def written(context: bpy.types.Context) -> Object | None:
         obj: Object = context.view_layer.objects.active
-        alone = (patch_record.MAP_RECORD, patch_record.ATLAS_RECORD)
-        return obj if obj is not None and any(key in obj for key in alone) else probe.patch_near(obj)
+        records = (patch_record.MAP_RECORD, patch_record.ATLAS_RECORD)
+        return obj if obj is not None and any(key in obj for key in records) else probe.patch_near(obj)
 
     def write(self, obj: Object) -> None:
         write(self.filepath, obj)

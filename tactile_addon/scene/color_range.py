@@ -72,7 +72,7 @@ PROPERTIES = {
         description="Value at which the colors end, in the unit of the legend; 0 chooses it by the values",
         min=0.0,
         precision=4,
-        step=0.1,  # It is small beside usual values in a unit that suits the patch.
+        step=0.1,  # It is small compared with usual values in a unit that suits the patch.
         get=_get,
         set=_set,
     )

@@ -15,8 +15,8 @@ from ..touch.types import Array
 from .attributes import CONTACT, CONTOUR
 from .mesh_data import fill
 
-RIM_CORNERS, RIM_THICKNESS = 96, 0.6  # The rim has so many points and this share of a contour's thickness.
-TIP = 3.6  # The tips of a contact are so many times a contour's thickness away from it,
+RIM_CORNERS, RIM_THICKNESS = 96, 0.6  # The number of points of the rim; its share of a contour's thickness.
+TIP = 3.6  # The distance of a contact's tips from it is this multiple of a contour's thickness,
 LEAST_TIP, GAP = 1.6, 0.4  # or this share of the way to the next one, if they would run together.
 CONTACT_TIPS = np.vstack([np.eye(3), -np.eye(3)])
 FACES = np.array([(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)])
@@ -39,7 +39,7 @@ class _Form(NamedTuple):
 def fill_contours(mesh: bpy.types.Mesh, touched: Touched) -> None:
     """Tubes along the contours and an octahedron at each contact, in the Darboux frame.
 
-    Point attributes tell them apart: `contour` is the number of the contour, and -1 for strokes and the rim;
+    Point attributes number them: `contour` is the number of the contour, and -1 for strokes and the rim;
     `contact` is the number of the contact along it, and -1 on tubes and the rim. All of this only shows what
     the patch keeps in its reconstruction.
     """
@@ -99,7 +99,7 @@ def _tubes(paths: Array, across: Array, sizes: Array, form: _Form) -> Array:
 
 @lru_cache(maxsize=8)
 def _form(lengths: tuple[int, ...], strokes: int) -> _Form:
-    """The form of a mesh of paths with these lengths, the rim being the last, and of so many strokes."""
+    """The form of a mesh of paths with these lengths, the rim being the last, and of contacts of strokes."""
     paths = [slice(end - n, end) for n, end in zip(lengths, np.cumsum(lengths), strict=True)]
     at, felt = np.arange(sum(lengths)), lengths[:-1]
     before, after, quads = at - 1, at + 1, []

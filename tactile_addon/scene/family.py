@@ -10,7 +10,7 @@ import bpy
 from ..touch.types import Object
 
 _remembered: dict[Object, list[Object]] | None = (
-    None  # Within `remembered`, the children by their parents; empty until somebody asks.
+    None  # Within `remembered`, the children by their parents; empty until it is needed.
 )
 
 

@@ -34,9 +34,9 @@ from .viewports import show_colors
 COLLECTION = "Tactile Patches"
 CONTOUR_COLOR = (0.02, 0.02, 0.02, 1.0)
 # It is drawn above the mesh by as much as it may be below it: by these shares of its radius at least and at
-# most, and by so many deviations of its height until it is compared with the mesh.
+# most, and by this multiple of its height's deviation until it is compared with the mesh.
 DRAWN_ABOVE, MOST_ABOVE, DEVIATIONS = 5e-3, 5e-2, 3.0
-STEEP = 1.7  # Where a patch is steep, it has to go up by so many times as much.
+STEEP = 1.7  # Where a patch is steep, it has to go up by more, by this factor.
 
 
 def insert(

@@ -26,7 +26,7 @@ COMMON_RANGE = "tactile_common_range"  # The range that suits all patches of its
 MAP_RECORD = "tactile_map"  # The report of a stability map.
 ATLAS_RECORD = "tactile_object"  # The report of a whole object.
 GRAPH = "tactile_graph"  # The graph of a whole object, core.Atlas.to_dict as JSON.
-CONTOURS = "tactile_contours"  # It tells contours from other children of a patch.
+CONTOURS = "tactile_contours"  # The custom property that contours have and other children of a patch do not.
 # What the colors can show: attribute, name, description, and the power of length in its unit.
 QUANTITIES = [
     ("gaussian_curvature", "Gaussian Curvature", "K: red on domes and bowls, blue on saddles", -2),
@@ -124,7 +124,7 @@ def mark_outdated(patch: Object, message: str) -> None:
 
 
 def mark_current(patch: Object) -> None:
-    """Lets the record say again what it said before, because the patch is what its probe asks for."""
+    """Puts the verdict of the record back, because the patch is that of its probe's inputs again."""
     verdict = patch.pop(VERDICT, None)
     if verdict is not None and report_of(patch) is not None:
         patch[RECORD].update(verdict)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How patches and whole objects are shown: their colors, and patches that are beside or over each other."""
+"""How patches and whole objects are shown: their colors, and patches that are near or over each other."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -27,7 +27,7 @@ LEAST_RANGE = 1e-3  # The range of colors is no smaller, in unit radius, so that
 LEAST_SHARE = 0.5  # That of K is no smaller than this share of the median curvedness, squared.
 LAYER = "tactile_layer"  # A patch's number among those that overlap; 0 is the lowest.
 ABOVE_OTHERS = "Above Other Patches"  # The modifier that draws it above those with lower numbers,
-APART = 2.0  # by so many deviations of the heights of both,
+APART = 2.0  # by this multiple of the deviations of the heights of both,
 LEAST_LAYER, MOST_LAYER = 3e-3, 3e-2  # and by no less and no more than these shares of its radius.
 ALIKE = 0.5  # Patches overlap only if the cosine between their normals is more.
 

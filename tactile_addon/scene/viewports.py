@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-NEAREST, FARTHEST = 0.02, 20.0  # An object is shown from so many of its sizes away.
+NEAREST, FARTHEST = 0.02, 20.0  # The distances, in sizes of an object, between which it is shown.
 # If a view is clipped nearer than at this share of the size, which Blender itself does not do below 1 cm, its
 # depths are so coarse that a patch and its contours run through each other.
 COARSE, OWN = 5e-4, 0.01

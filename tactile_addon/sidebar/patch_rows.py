@@ -11,7 +11,7 @@ from ..touch import units
 from ..touch.touch_report import TouchReport
 from ..touch.units import Unit
 
-FLAT_DEVIATIONS = 2.0  # A curvature within so many deviations of 0 has no radius.
+FLAT_DEVIATIONS = 2.0  # A curvature within this many deviations of 0 has no radius.
 FLATTEST = 1e-3  # Nor has one whose radius is a thousand times the patch's.
 ZERO = 1e-6  # A number below this, in unit radius, counts as 0.
 
@@ -48,7 +48,7 @@ def other_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
 
 
 def plane_rows(record: TouchReport, unit: Unit) -> list[tuple[str, str]]:
-    """(label, value) of the plane that would tell most, once it is known."""
+    """(label, value) of the plane that would lower the deviation most, once it is known."""
     if not record["is_verified"]:
         return []
     plane = record["suggested_plane"]

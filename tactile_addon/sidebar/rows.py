@@ -91,7 +91,7 @@ def draw_rows(
 ) -> None:
     """Draws labels and values side by side, gray if they are not active; a heading has no value.
 
-    A value that has no room beside its label stands below it.
+    A value that has no room to the right of its label stands below it.
     """
     longest = max((len(label) for label, value in rows if value), default=0)
     share = min(max((longest + 3) / _letters(context), 0.34), 0.66)

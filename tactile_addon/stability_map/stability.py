@@ -22,9 +22,9 @@ from ..touch.units import length
 
 EXTENT_SHARE = 1.0 / 8.0  # This share of the object's size stands for an extent that touches choose.
 SPACING_SHARE = 1.0 / 4.0  # The default spacing, as a share of the extent.
-BATCH = 20  # So many touches are fitted at once, in some hundredths of a second.
+BATCH = 20  # The number of touches that are fitted at once, in some hundredths of a second.
 GROWING_BATCH = 4  # Touches that choose their extent are fewer, because their fits have more contacts.
-NEAREST_AT_ONCE = 10_000  # So many vertices get their nearest touch at once.
+NEAREST_AT_ONCE = 10_000  # The number of vertices that get their nearest touch at once.
 NOTHING = -1.0  # Each quantity has this value where there is no patch.
 # The values of the attribute `reason`: key, name, and the stop of a curve that it follows from.
 REASONS = [
@@ -180,7 +180,7 @@ class StabilityMap:
             result.mean_height_std,
             touch.extent,
             result.condition_number,
-            result.blind_share,
+            result.null_space_share,
         )
 
     def report(self) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from .arrays import read_array
 from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object
 from .types import Array, Object, Point, Triple
 
-PAUSE = 50.0  # The shape is compared again after so many times as long as that takes.
+PAUSE = 50.0  # The time until the shape is compared again, as a multiple of the time that this takes.
 
 
 class DetachedMesh(PlacedMesh):

@@ -56,7 +56,7 @@ def evaluated_object(obj: Object, depsgraph: bpy.types.Depsgraph) -> tuple[Objec
         raise disabled(obj)
     evaluated = obj.evaluated_get(depsgraph)
     if obj.data.is_editmode:
-        # The evaluated mesh is an empty shell around the edited one until somebody asks for it.
+        # The evaluated mesh is an empty shell around the edited one until `to_mesh` makes it.
         evaluated.to_mesh()
         evaluated.to_mesh_clear()
     matrix = np.array(evaluated.matrix_world, dtype=float)

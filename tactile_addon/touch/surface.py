@@ -13,10 +13,10 @@ from .arrays import read_array
 from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, size_of
 from .types import Array, Object, Point, Triple
 
-MANY = 8  # So many times as many vertices as are wanted are looked at first, before all are.
-WALK = 8  # The way to the nearest point of a stretched object has at most so many steps; mostly two or three.
+MANY = 8  # This multiple of the vertices that are needed is looked at first, before all are.
+WALK = 8  # The most steps on the way to the nearest point of a stretched object; mostly two or three do.
 AT_VERTEX = 1e-4  # A point that is nearer to a vertex than this share of its face's size is that vertex.
-SMOOTH = 0.77  # The cosine between the normals of a vertex and of a face beside it is more, but on a crease.
+SMOOTH = 0.77  # The cosine between the normals of a vertex and of each of its faces is more, but on a crease.
 
 
 class MeshSurface(PlacedMesh):
@@ -57,7 +57,7 @@ class MeshSurface(PlacedMesh):
         # A sphere in the world is an ellipsoid in the object, which its longest axis bounds.
         reach = radius * np.linalg.norm(self._inverse, ord=2)
         at, few = self._to_local(point).astype(np.float32), len(self._co) // (MANY * (most or len(self._co)))
-        for stride in dict.fromkeys((max(few, 1), 1)):  # All are asked only if some are not enough.
+        for stride in dict.fromkeys((max(few, 1), 1)):  # All are looked at only if some are not enough.
             local = self._co[::stride] - at
             near = stride * np.flatnonzero(np.einsum("ij,ij->i", local, local) <= reach**2)
             if most is not None and len(near) >= most:

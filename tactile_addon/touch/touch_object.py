@@ -31,8 +31,8 @@ from .units import length
 FARTHEST_SHARE = 1.0 / 2.0  # A half contour is at most this share of the object's size long.
 AWAY = 1.0 / 8.0  # Without an extent, the location may be this share of the size off the surface.
 FINEST_STEP = 1.0 / 128.0  # The step is this share of the size if neither step nor extent is given.
-LEAST_STEPS = 12  # Without a step, a half contour has at least so many.
-LARGE_FACET = 4.0  # The finger feels facets that are longer than so many steps, and creases between them.
+LEAST_STEPS = 12  # Without a step, a half contour has at least this many.
+LARGE_FACET = 4.0  # The finger feels facets that are longer than this many steps, and creases between them.
 STEP_ROUNDING = 1.0 / 20.0  # Contacts that are rounded by more of a step say nothing about curvature.
 
 

@@ -76,7 +76,7 @@ class TouchReport(TypedDict, total=False):
     mean_curvature_std: float
     shape_index: float
     curvedness: float
-    residual: float  # The amplitude of the process beside the polynomial.
+    residual: float  # The amplitude of the process that is added to the polynomial.
     coefficients: list[float]  # Those of equation (1).
     radius: float
     contacts: int
@@ -168,7 +168,7 @@ def judgment(result: core.Reconstruction, mean: float, ended: str, few_facets: b
 
 
 def suggestion_report(result: core.Reconstruction, reference: Array) -> SuggestedPlane:
-    """The plane that would tell most, with an azimuth like those of the planes, and what it would bring."""
+    """The plane that would lower the mean deviation most, its azimuth as of planes, and that deviation."""
     e1, outward = reference[:, 0], reference[:, 1]
     plane, expected = core.suggest_plane(result, outward, e1)
     return {
@@ -215,5 +215,5 @@ def reconstruction_report(
         "contacts": len(result.contacts),
         "fit_error": result.fit_error,
         "height_std": result.mean_height_std,
-        "blind": result.blind,
+        "blind": result.null_space_dimension,
     }

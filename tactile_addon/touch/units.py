@@ -45,7 +45,7 @@ def say(value: float, power: int, unit: Unit, std: float | None = None) -> str:
 
 
 def known(value: float, std: float | None) -> float:
-    """The value, or 0 if it is only rounding beside its standard deviation, which may be None."""
+    """The value, or 0 if it is mere rounding compared with its standard deviation, which may be None."""
     return 0.0 if std is not None and abs(value) < ROUNDING * std else value
 
 

@@ -178,7 +178,7 @@ def _suggestion(plane: SuggestedPlane, unit: Unit) -> str:
 
 
 def vector(v: Iterable[float]) -> str:
-    """Components in words; those that are only rounding beside the largest are 0."""
+    """Components in words; those that are mere rounding compared with the largest are 0."""
     components = list(v)
     rounding = ROUNDING * max(map(abs, components))
     return " ".join(f"{x if abs(x) > rounding else 0.0:.5g}" for x in components)

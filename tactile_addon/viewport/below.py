@@ -15,7 +15,7 @@ from ..touch.surface import MeshSurface
 from ..touch.types import Object, Point
 from .mouse import mouse_ray, viewport_below
 
-LAYERS = 64  # The mouse sees through at most so many patches and hidden objects.
+LAYERS = 64  # The most patches and hidden objects through which the mouse reaches.
 MANY_FACES = 200_000  # The first touch of a mesh with more faces takes a noticeable time.
 
 

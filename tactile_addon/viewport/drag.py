@@ -136,7 +136,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
         self._set(context, Matrix.LocRotScale(list(hit[0]), turn, self._matrix.to_scale()))
 
     def _below(self, context: bpy.types.Context, event: bpy.types.Event) -> float | None:
-        """The angle of the mouse, or its distance from the point; None if that cannot be told."""
+        """The angle of the mouse, or its distance from the point; None on the point and edge-on."""
         origin, direction = mouse_ray(context.region, context.region_data, event)
         center, normal = self._matrix.translation, self._matrix.col[2].xyz.normalized()
         e1 = self._matrix.col[0].xyz.normalized()

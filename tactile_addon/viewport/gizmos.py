@@ -15,11 +15,11 @@ from ..touch.touch_object import plane_axes
 from .drag import DRAG_EXTENT, DRAG_TILT, DRAG_TURN, POINT, STEEP, shown_probe
 from .overlay import PLANE_COLORS
 
-HANDLE_REACH = 1.15  # Handles that turn planes are so many extents away from the point,
-UPRIGHT = 0.75  # and those that tilt planes so many extents above it.
+HANDLE_REACH = 1.15  # Handles that turn planes are this many extents away from the point,
+UPRIGHT = 0.75  # and those that tilt planes this many extents above it.
 BALL, LEAST_BALL = 0.12, 0.05  # Sizes of balls, in units of Blender's gizmo size.
 SHARE = 0.125  # A ball is no larger than this share of the patch in the view.
-APART = 24.0  # Handles that are nearer to the point in the view than so many pixels at scale 1 are hidden.
+APART = 24.0  # Handles that are nearer to the point in the view than this many pixels at scale 1 are hidden.
 NEAREST = 1e3  # What is closer to the eye than the point by less than this does not win over it.
 
 
@@ -90,7 +90,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
     def _shrink(self, context: bpy.types.Context, center: Vector, reach: float) -> Callable[[Vector], bool]:
         """Makes the balls smaller if the patch is small in the view, so that they do not hide it.
 
-        Returns a function that tells whether a place is apart from the center in the view.
+        Returns a function that is true where a place is apart from the center in the view.
         """
 
         def seen(place: Vector) -> Any:

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 from mathutils import Vector
 
-WIDE = ("EVENT_ESC", "EVENT_CTRL")  # These icons reach into the text beside them.
+WIDE = ("EVENT_ESC", "EVENT_CTRL")  # These icons reach into the text on their right.
 
 
 def draw_hints(layout: bpy.types.UILayout, hints: Iterable[tuple[Any, str]]) -> None:

@@ -29,8 +29,8 @@ PLANE_COLORS = [
 ]  # fmt: skip
 WHITE, DARK = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.6)
 FONT = 0  # This is Blender's own font.
-LEGEND_STEPS = 65  # The legend's bar shows so many colors.
-LETTERS, BESIDE = 48, 16  # Words beside the mouse have lines of so many letters, so many pixels away from it.
+LEGEND_STEPS = 65  # The number of colors of the legend's bar.
+LETTERS, OFFSET = 48, 16  # The letters in a line of words near the mouse, and the pixels between them.
 # Width and height of the legend's bar and of Blender's navigation buttons, in pixels at resolution scale 1.
 BAR, NAVIGATION_GIZMO = (150, 12), (50, 290)
 
@@ -47,7 +47,7 @@ def preview_lines(touched: Touched) -> list[tuple[Array, tuple[float, ...]]]:
 
 
 def draw_key(seen: dict[str, Any]) -> None:
-    """Draws what the lines of the preview are, or beside the mouse why there is none."""
+    """Draws what the lines of the preview are, or next to the mouse why there is none."""
     context = bpy.context
     if not _is_over(context.region, seen["mouse"]):
         return
@@ -66,7 +66,7 @@ def _is_over(region: bpy.types.Region, mouse: Sequence[float]) -> bool:
 
 
 def _draw_words(context: bpy.types.Context, lines: Sequence[str], mouse: Sequence[float]) -> None:
-    """Draws lines of text in a box beside a place of the window, in the region that has it."""
+    """Draws lines of text in a box next to a place of the window, in the region that has it."""
     region, scale = context.region, context.preferences.system.ui_scale
     x, y = mouse[0] - region.x, mouse[1] - region.y
     theme: Any = context.preferences.themes[0].user_interface.wcol_tooltip
@@ -77,8 +77,8 @@ def _draw_words(context: bpy.types.Context, lines: Sequence[str], mouse: Sequenc
     wide = max(blf.dimensions(FONT, text)[0] for text in lines) + 2.0 * gap
     high = len(lines) * (line + gap) + gap
     left, right, bottom = _free_strip(context, high)
-    x = max(min(x + BESIDE * scale, right - gap - wide), left)
-    y = min(max(y - BESIDE * scale - high, bottom), region.height - high)
+    x = max(min(x + OFFSET * scale, right - gap - wide), left)
+    y = min(max(y - OFFSET * scale - high, bottom), region.height - high)
     _fill_box(x, y, wide, high, (*theme.inner[:3], 0.9))
     for number, text in enumerate(lines):
         _write(text, x + gap, y + high - (number + 1) * (line + gap))
@@ -111,7 +111,7 @@ def _active(context: bpy.types.Context) -> Object | None:
 
 
 def draw_plane() -> None:
-    """Draws the active sampling plane while a handle is dragged, as far as its contour may reach."""
+    """Draws the part of the active sampling plane that its contour may reach, while a handle is dragged."""
     context = bpy.context
     if not any(operator.bl_idname == "TACTILE_OT_drag" for operator in context.window.modal_operators):
         return
@@ -230,7 +230,7 @@ def _draw_bar(
     labels = [(share, text.replace("-", "\N{MINUS SIGN}")) for share, text in labels]
     first, middle, last = (blf.dimensions(FONT, text)[0] for _, text in labels)
     if 0.5 * (wide - middle) < max(first, last):
-        del labels[1]  # It would run into one beside it.
+        del labels[1]  # It would run into another one.
     line = blf.dimensions(FONT, "0")[1]
     for share, text in labels:
         middle = x + (share - low) / (1.0 - low) * wide

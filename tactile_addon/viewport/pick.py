@@ -207,7 +207,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
     def _hover(self, context: bpy.types.Context, event: bpy.types.Event) -> str:
         """Touches below the mouse for the preview, and returns what there is to say of it.
 
-        The header has no room for a sentence, so a refusal is drawn beside the mouse.
+        The header has no room for a sentence, so a refusal is drawn next to the mouse.
         """
         words = short = "Move over a mesh to touch it"
         self._seen |= {"touched": None, "refusal": None, "mouse": (event.mouse_x, event.mouse_y)}

@@ -15,10 +15,10 @@ from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Array
 
 WITHIN = 0.05  # The mesh is looked for along the normal within this share of its size.
-PLACES, SEED = 10_000, 0  # So many places of the mesh's faces are compared, and at most as many vertices.
-AT_ONCE, BACK_AT_ONCE = 1000, 300  # A step compares so many places of the surface, or of the mesh.
-FACES_AT_ONCE = 10_000  # A tree has so many faces, because making a larger one takes too long for a step.
-WAYS = 40  # A place is hidden if rays in so many directions all meet the mesh again.
+PLACES, SEED = 10_000, 0  # The number of places on the mesh's faces, and the most vertices, to compare.
+AT_ONCE, BACK_AT_ONCE = 1000, 300  # The number of places of the surface, or of the mesh, for a step.
+FACES_AT_ONCE = 10_000  # The most faces in a tree, because making a larger one takes too long for a step.
+WAYS = 40  # A place is hidden if rays in this many directions all meet the mesh again.
 LIFT = 1e-4  # They begin this share of the size away from it.
 GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 
@@ -66,7 +66,7 @@ class BothWays:
         for start in range(0, len(points), AT_ONCE):
             some = slice(start, start + AT_ONCE)
             found = self._target.deviations(points[some], normals[some], WITHIN * self._target.size)
-            # Beside a crease a ray along the normal may meet a face that is not the nearest.
+            # Near a crease a ray along the normal may meet a face that is not the nearest.
             for i in np.flatnonzero(np.abs(found) > self._tolerance).tolist():
                 with suppress(ValueError):  # The nearest face has no area.
                     nearest = self._target.project(points[start + i].tolist())[2]

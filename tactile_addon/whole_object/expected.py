@@ -16,9 +16,9 @@ from ..touch.wording import many
 from .object_report import LEAST_NUMBER
 from .object_touches import tolerance_of
 
-TRIED, SEED = 12, 0  # So many touches are made to know.
-# A touch with its part of joining takes so many times as long as one that is tried, and a mesh as long as
-# so many of these: python -m benchmarks.add_menu.
+TRIED, SEED = 12, 0  # The number of touches that are made for the estimate.
+# The time of a touch with its part of joining, and that of a mesh, as multiples of the time of a touch that
+# is tried: python -m benchmarks.add_menu.
 JOINING, MESHING = 3.3, 60.0
 
 

@@ -12,7 +12,7 @@ from ..touch import units
 from ..touch.units import Unit
 from ..touch.wording import many, vector
 
-LEAST_NUMBER = 10.0  # Lengths are in a unit that suits so many tolerances.
+LEAST_NUMBER = 10.0  # Lengths are in a unit that suits this many tolerances.
 ZERO = 1e-6  # A distance below this share of the size counts as 0.
 
 

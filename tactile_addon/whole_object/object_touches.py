@@ -24,8 +24,8 @@ from .whole_surface import WholeSurface
 TOLERANCE_SHARES = {"quick": 1.0 / 200.0, "normal": 1.0 / 500.0, "fine": 1.0 / 1250.0}
 LARGEST_TOLERANCE, LARGEST_EDGE = 0.1, 0.5  # With more, neither patches nor triangles would fit.
 OFF_TOLERANCES = 3.0  # The surface is no good if it is off the mesh by more tolerances, as in core's check.
-STARTS = 20  # So many places to begin are tried if none is given.
-PLACES, SEED = 1000, 0  # The progress is the share of so many places all over the mesh that patches cover.
+STARTS = 20  # The number of places to begin that are tried if none is given.
+PLACES, SEED = 1000, 0  # The progress is the share of this many places on the mesh that patches cover.
 TOUCHED, JOINED = 0.5, 0.8  # Of all that is to be done, touching and joining are done at these shares.
 
 

@@ -73,7 +73,7 @@ def _disk(r: core.Reconstruction, rim: Array, above: float) -> tuple[Array, Arra
     """Points (n, 3) of a patch, on rings around its middle, and their Gaussian curvatures (n,).
 
     rim : (k SPOKES,), the radii of the patch all round, where the finger felt it end
-    above : the points are so far above the patch
+    above : the height of the points above the patch
     """
     angles = np.linspace(0.0, 2.0 * np.pi, SPOKES, endpoint=False)
     edge = rim[:: len(rim) // SPOKES, None] * np.column_stack([np.cos(angles), np.sin(angles)])

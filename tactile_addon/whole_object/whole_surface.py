@@ -12,7 +12,7 @@ from ... import core
 from ...core.steps import part_of
 from ..touch.types import Array
 
-CURVED_AT_ONCE = 1000  # A step computes the curvatures at so many vertices.
+CURVED_AT_ONCE = 1000  # A step computes the curvatures at this many vertices.
 
 
 class WholeSurface:

@@ -383,7 +383,7 @@ def test_a_ply_that_blender_reads_otherwise_or_ends_over_is_refused(command, emp
     assert f'no mesh could be read from "{kind}"' in command("map", tmp_path / kind)[2]
 
 
-def test_where_curves_meet_is_told_in_double_precision(command, empty, tmp_path):
+def test_where_curves_meet_is_reported_in_double_precision(command, empty, tmp_path):
     point, t = np.array([1000.00012, 700.0004, -300.0]), np.linspace(-0.01, 0.01, 41)
     rows = ["curve,x,y,z"]
     for azimuth in (0, 1, 2):
@@ -392,8 +392,8 @@ def test_where_curves_meet_is_told_in_double_precision(command, empty, tmp_path)
             rows.append(f"{azimuth},{','.join(map(repr, place.tolist()))}")
     path = tmp_path / "curves.csv"
     path.write_text("\n".join(rows))
-    told = ["--point", *map(repr, point.tolist())]
-    code, out, _ = command("fit", path, *told, "--outward", 0, 0, 1, "--json", "-")
+    given = ["--point", *map(repr, point.tolist())]
+    code, out, _ = command("fit", path, *given, "--outward", 0, 0, 1, "--json", "-")
     assert code == 0
     report = json.loads(next(line for line in out.splitlines() if line.startswith("{")))
     assert report["frame"]["origin"] == point.tolist()

@@ -179,7 +179,7 @@ def test_wrong_words_are_refused_before_anything_is_made(command, objects, tmp_p
     assert not (tmp_path / "set").exists()
 
 
-def test_a_list_names_files_beside_it(objects):
+def test_a_list_names_files_next_to_it(objects):
     from cluster.input_files import files_of
 
     listed = objects / "all.txt"

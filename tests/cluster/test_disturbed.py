@@ -244,12 +244,12 @@ def test_a_process_that_takes_too_long_is_ended(objects, plain, tmp_path):
     from cluster.data_set import manifest
     from cluster.worker.process import HandProcess, LostError
 
-    asked = json.loads((plain / "manifest.json").read_text())["options"] | {"touches": 5000, "block": 5000}
+    options = json.loads((plain / "manifest.json").read_text())["options"] | {"touches": 5000, "block": 5000}
     survey = ("survey", str(objects / "pebble.ply"), manifest.versions())
     hand = HandProcess()
     _, (facts,) = hand.ask(100.0, *survey)
     with pytest.raises(LostError) as busy:  # half a second is too short for 5000 touches
-        hand.ask(0.5, "touch", facts, asked, 0, str(tmp_path / "block.parquet"))
+        hand.ask(0.5, "touch", facts, options, 0, str(tmp_path / "block.parquet"))
     assert str(busy.value).startswith("It took longer than the limit of 0.5 s\n")
     assert "most recent call first" in str(busy.value)  # this says where the process was
     assert hand.is_worn and not list(tmp_path.iterdir())
@@ -410,7 +410,7 @@ def test_a_second_run_in_the_same_folder_is_refused_until_the_first_has_ended(
     assert rows_of(tmp_path) == rows_of(plain) and nothing_is_aside(tmp_path)
 
 
-def test_a_name_that_is_not_utf_8_costs_its_file_alone(command, objects, tmp_path):
+def test_a_name_that_is_not_utf_8_costs_only_its_file(command, objects, tmp_path):
     (tmp_path / "objects").mkdir()
     for name in (b"good.ply", b"caf\xe9.ply"):
         with open(os.fsencode(tmp_path / "objects") + b"/" + name, "wb") as file:
@@ -443,13 +443,13 @@ def test_a_worker_whose_run_is_gone_finishes_the_file_that_it_writes(objects, pl
     from cluster.data_set import manifest
     from cluster.worker.process import HandProcess
 
-    asked = json.loads((plain / "manifest.json").read_text())["options"]
+    options = json.loads((plain / "manifest.json").read_text())["options"]
     for tenth in range(4):
         hand = HandProcess()
         _, (facts,) = hand.ask(100.0, "survey", str(objects / "pebble.ply"), manifest.versions())
         folder = tmp_path / str(tenth) / "touches"
         folder.mkdir(parents=True)
-        order = (100.0, "touch", (facts, asked, 0, str(folder / "block.parquet")))
+        order = (100.0, "touch", (facts, options, 0, str(folder / "block.parquet")))
         hand._connection.send(order)
         wait_for(lambda folder=folder: list(folder.iterdir()))  # It has begun to write.
         hand._connection.close()

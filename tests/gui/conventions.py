@@ -3,7 +3,7 @@
 """Run in a window of Blender on the scene of make_scene.py: what users expect of any extension.
 
 It checks search, menus, Adjust Last Operation, presets, grayed-out buttons, the tab and large letters. Every
-step asserts on Blender's data and leaves a picture, to be looked at, beside the scene.
+step asserts on Blender's data and leaves a picture, to be looked at, next to the scene.
 """
 
 import math
@@ -164,7 +164,7 @@ def tab():
     yield 1
 
 
-def look_beside_the_panel(point, direction, distance):
+def look_next_to_the_panel(point, direction, distance):
     """Does what look() does, with the point in the left third."""
     look(point, direction, distance)
     view = gui.find()[1].spaces.active.region_3d
@@ -178,7 +178,7 @@ def large(place):
         bpy.ops.screen.screen_full_area()
     bpy.context.preferences.view.ui_scale = 2.0
     yield 2
-    look_beside_the_panel(place, (0.3, -1, 0.3), 5)
+    look_next_to_the_panel(place, (0.3, -1, 0.3), 5)
     yield 0.5
     window, area, region = gui.find()
     with bpy.context.temp_override(window=window, area=area, region=region):
@@ -190,7 +190,7 @@ def large(place):
     gui.xdo("key", "Escape")
     yield 0.5
     axes = probe().matrix_world
-    look_beside_the_panel(axes.translation, axes.col[2].xyz + 0.3 * axes.col[1].xyz, 2.5)
+    look_next_to_the_panel(axes.translation, axes.col[2].xyz + 0.3 * axes.col[1].xyz, 2.5)
     yield 0.5
     before, azimuth = state(), probe().tactile_probe.azimuths[2]
     start, end = (map(round, handle(azimuth + turn)) for turn in (0.0, 0.2))

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender: what is tried first, a torus of facets and Suzanne as Blender's menu adds them.
 
-Its pictures are beside the scene.
+Its pictures are next to the scene.
 """
 
 import math
@@ -143,7 +143,7 @@ def cubes():
     look((0, 0, 0), (1, -1, 0.6), 5)
     yield from pick(cube, (1.0, -1.0, 0.2))
     said = patch()["tactile"]["message"]
-    check("a point on an edge is told to move away", "move the point away from that edge" in said, said)
+    check("the advice for a point on an edge: move away", "move the point away from that edge" in said, said)
     picture("cube_edge")
     cube = only(bpy.ops.mesh.primitive_cube_add, size=1e-3)
     look((0, 0, 0), (0.5, -1, 0.6), 2.5e-3)

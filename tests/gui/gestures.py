@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender on the scene of make_scene.py: an automatic extent while a point is dragged.
 
-It uses the scan of a pear where there is one, else Suzanne. Its pictures are beside the scene.
+It uses the scan of a pear where there is one, else Suzanne. Its pictures are next to the scene.
 """
 
 import sys
@@ -20,7 +20,7 @@ SLIDES = 12
 
 
 def target():
-    """The name of the object to touch, alone in the view."""
+    """The name of the object to touch, the only one in the view."""
     file = FOLDER / "pear.ply"
     if not file.is_file():
         return "Suzanne"

@@ -3,7 +3,7 @@
 """Run in a window of Blender on the scene of make_scene.py: a probe and its patch as Blender's objects.
 
 It checks what undo, playback, moving, deleting and clicking do to them, with a picture after each.
-TACTILE_SCAN names a mesh file to use in place of Suzanne, or is "million", for a sheet of so many faces.
+TACTILE_SCAN names a mesh file to use in place of Suzanne, or is "million", for a sheet of a million faces.
 """
 
 import math

@@ -63,7 +63,7 @@ def first():
 
 
 def refused():
-    """Where there can be no touch, words beside the mouse say why, and a click does not end the pick."""
+    """Where there can be no touch, words next to the mouse say why, and a click does not end the pick."""
     bpy.ops.object.metaball_add(type="BALL", radius=1.0, location=(0.0, 0.0, 0.5))
     ball = bpy.context.object
     ball.name = "Metaball Whose Name Takes Two Lines"

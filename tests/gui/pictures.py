@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender on the scene of make_scene.py: the pictures of docs/viewport.md, taken anew.
 
-They are beside the scene: pick.jpg, probe.jpg and deviation.jpg. verify.py and stability.py take
+They are next to the scene: pick.jpg, probe.jpg and deviation.jpg. verify.py and stability.py take
 verify.jpg and stability.jpg.
 """
 

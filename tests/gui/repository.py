@@ -29,7 +29,7 @@ PORT = 8791
 
 
 def offer(zip_path, version=None):
-    """Makes the repository have this zip alone, under its own version or another."""
+    """Makes the repository have only this zip, under its own version or another."""
     REPOSITORY.mkdir(exist_ok=True)
     for path in REPOSITORY.iterdir():
         path.unlink()

@@ -130,7 +130,7 @@ def check_contacts():
             off = max(
                 abs(a - b) for a, b in zip(*(r["frame"]["normal"] for r in (touched, fitted)), strict=True)
             )
-            check("... the same patch, by its contacts alone", off < 0.02, curvatures(fitted))
+            check("... the same patch, by nothing but its contacts", off < 0.02, curvatures(fitted))
     code, stdout, stderr = blender("-c", "tactile", "fit", folder / "notes.txt")
     good = code == 1 and stderr.startswith("tactile: ") and "Traceback" not in stdout + stderr
     check("fit says what a file of no contacts lacks", good, f"code {code}\n{stderr}\n{stdout}")

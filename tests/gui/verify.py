@@ -85,7 +85,7 @@ def another_mesh():
         found(),
     )
     off = found().get("vertex_distance_median", 0.0)
-    check("... which is as far off as it was moved", abs(off - 0.05) < 0.01, off)
+    check("... which is off by as much as it was moved", abs(off - 0.05) < 0.01, off)
     check("... and in doubt, in the status bar too", "off the patch" in last_report(), last_report())
     picture("verify_doubt")
     bpy.data.objects.remove(other)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender on the scene of make_scene.py: probes by mouse and keyboard, as a user has them.
 
-Every step asserts on Blender's data and leaves a picture, to be looked at, beside the scene.
+Every step asserts on Blender's data and leaves a picture, to be looked at, next to the scene.
 """
 
 import math

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender on the scene of make_scene.py: an object touched all over, as a user does it.
 
-Every step asserts on Blender's data and leaves a picture, to be looked at, beside the scene.
+Every step asserts on Blender's data and leaves a picture, to be looked at, next to the scene.
 """
 
 import sys
@@ -104,9 +104,9 @@ def by_dialog():
     check("while they grow, patches end where the object does", off < 0.02, off)
     picture("whole_growing")
     yield from until(lambda: not running(), 120)
-    told = [words for words in WORDS if words[0].isdigit()]
-    check("... with the share that is done", all(words.endswith("%") for words in told), told[-3:])
-    shares = [int(words.rpartition(" ")[2].removesuffix("%")) for words in told]
+    progress = [words for words in WORDS if words[0].isdigit()]
+    check("... with the share that is done", all(words.endswith("%") for words in progress), progress[-3:])
+    shares = [int(words.rpartition(" ")[2].removesuffix("%")) for words in progress]
     check("... which grows", shares == sorted(shares) and shares[-1] >= 40, shares[-3:])
     (surface,) = surfaces() or [None]
     if not check("it ends by itself with a surface", surface is not None, data_blocks()):

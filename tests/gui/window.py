@@ -4,7 +4,7 @@
 
 It checks what background runs cannot: the 3D cursor set by mouse, the entry of the Object menu, undo and
 redo by keyboard, and what is seen. Two pictures are to be looked at: suzanne.png, and the window at the end,
-which shows a scan where pear.ply is beside the scene.
+which shows a scan where pear.ply is next to the scene.
 """
 
 import os
@@ -102,7 +102,7 @@ def suzanne():
 
 
 def pear():
-    """A scan some centimeters wide, in meters, alone in the viewport."""
+    """A scan some centimeters wide, in meters, the only object in the viewport."""
     for obj in bpy.data.objects:
         obj.hide_set(True)
     bpy.ops.wm.ply_import(filepath=str(FOLDER / "pear.ply"))

@@ -177,7 +177,7 @@ def test_half_covered_and_nothing_below(empty, patch, capfd):
 
 
 def test_layers_hidden_from_a_finger_do_not_count(empty, patch):
-    alone = verified(empty, patch)
+    single = verified(empty, patch)
     for i, radius in enumerate((0.99, 0.95)):  # inner walls, which face outward too
         add_ball(empty, radius * RADIUS, f"Wall {i}")
     empty.context.view_layer.objects.active = empty.data.objects["Sphere"]
@@ -186,7 +186,7 @@ def test_layers_hidden_from_a_finger_do_not_count(empty, patch):
     empty.ops.object.join()
     activate(empty, patch)
     nested = verified(empty, patch, target="Sphere")
-    assert nested == pytest.approx(alone)
+    assert nested == pytest.approx(single)
 
 
 def test_a_coarse_mesh_has_no_vertices_over_the_patch(empty, capfd):

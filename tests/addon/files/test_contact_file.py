@@ -89,7 +89,7 @@ def test_the_unit_is_in_the_columns(read, header, unit):
     assert points(contours) == WANTED.tolist()
 
 
-def test_curves_named_strokes_run_beside_the_point(contact_file, read, tmp_path):
+def test_curves_named_strokes_do_not_pass_through_the_point(contact_file, read, tmp_path):
     text = PLAIN.replace("\n2,", "\nStroke 7,")
     assert points(read(text)[0]) == [WANTED[0].tolist()]
     found = contact_file.read(tmp_path / "contacts.csv")
@@ -233,9 +233,9 @@ def test_what_was_exported_and_is_read_gives_the_same_patch(
 
 def test_comments_that_are_not_ours_say_nothing(contact_file, tmp_path):
     """The comments are those of other programs, of version 1, and below the header."""
-    told = "# point 1 2 3\n# noise 5\n"
+    notes = "# point 1 2 3\n# noise 5\n"
     titles = "# made by a robot\n", "# Tactile Patch contacts, version 1, lengths in no unit\n", ""
-    for text in (titles[0] + told + PLAIN, titles[1] + PLAIN, titles[2] + told + PLAIN, PLAIN + told):
+    for text in (titles[0] + notes + PLAIN, titles[1] + PLAIN, titles[2] + notes + PLAIN, PLAIN + notes):
         (tmp_path / "other.csv").write_text(text)
         contours, unit, point, outward, _ = contact_file.read(tmp_path / "other.csv")
         assert (unit, point, outward, contours[0].noise) == ("", None, None, None)

@@ -122,7 +122,7 @@ def wiped(extension, path, marked, noise=0.02, also=()):
 
 
 @pytest.mark.parametrize("marked", [True, False])
-def test_strokes_alone_become_a_patch_around_a_place(extension, empty, tmp_path, marked):
+def test_strokes_without_contours_become_a_patch_around_a_place(extension, empty, tmp_path, marked):
     path = wiped(extension, tmp_path / "wiped.csv", marked)
     options = {"point": list(SURFACE.point + 0.3), "noise": 0.02, **({} if marked else {"strokes": True})}
     patch, report = imported(empty, path, **options)
@@ -149,7 +149,7 @@ def test_without_a_place_it_is_the_mean_of_the_strokes(extension, empty, tmp_pat
     assert report["frame"]["origin"] == pytest.approx(SURFACE.point, abs=2.0)
 
 
-def test_strokes_beside_contours_are_fitted_and_go_out_again(extension, empty, tmp_path):
+def test_strokes_with_contours_are_fitted_and_go_out_again(extension, empty, tmp_path):
     path = wiped(extension, tmp_path / "both.csv", True, also=contours_of(SURFACE))
     _, report = imported(empty, path, point=list(SURFACE.point))
     assert (report["curves"], report["strokes"]) == (3, 12)
@@ -188,15 +188,15 @@ def test_contacts_in_any_order_are_drawn_along_their_curve(empty, measured):
 
 
 def test_what_a_file_says_of_its_patch_counts_unless_something_else_is_given(empty, measured, tmp_path):
-    """The file names the side opposite to the bulge, and a point beside where the curves meet."""
+    """The file names the side opposite to the bulge, and a point near the one where the curves meet."""
     path = Path(measured(normals=False))
     point, down = SURFACE.point + 0.01 * SURFACE.normal, -SURFACE.normal
-    told = "".join(
+    comments = "".join(
         f"# {key} {' '.join(map(repr, values.tolist()))}\n"
         for key, values in (("point", point), ("outward", down))
     )
     title, *rows = path.read_text().splitlines(keepends=True)
-    path.write_text(title + told + "# noise 0.5\n" + "".join(rows))
+    path.write_text(title + comments + "# noise 0.5\n" + "".join(rows))
     _, report = imported(empty, str(path))
     assert report["frame"]["origin"] == pytest.approx(point, rel=1e-12)
     assert np.dot(report["frame"]["normal"], down) > 0.99

@@ -38,9 +38,9 @@ ROWS = np.linspace(-1.0, 1.0, 17)
 def write(extension, empty, tmp_path):
     """A function that writes strokes to a file of a given name and returns the path."""
 
-    def write(name, strokes, **told):
+    def write(name, strokes, **known):
         contact_file = extension.tactile_addon.files.contact_file
-        contact_file.write(tmp_path / name, Contacts([], "", strokes=tuple(strokes), **told))
+        contact_file.write(tmp_path / name, Contacts([], "", strokes=tuple(strokes), **known))
         return tmp_path / name
 
     return write
@@ -97,7 +97,7 @@ def test_one_patch_of_files_with_points_of_their_own_is_still_refused(empty, thr
         empty.ops.tactile.import_contacts(directory=str(three_files[0].parent), files=files)
 
 
-def test_where_no_normals_were_measured_the_outer_side_is_asked_for(empty, two_halves):
+def test_where_no_normals_were_measured_the_outer_side_is_required(empty, two_halves):
     before = datablocks(empty)
     with pytest.raises(
         RuntimeError, match="Outward: expected a direction where contacts have no normals and do not close"

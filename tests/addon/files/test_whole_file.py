@@ -101,7 +101,7 @@ def test_the_operators_that_export_too(empty, ball, tmp_path):
     assert sorted(os.listdir(tmp_path)) == ["full", "out.csv", "out.json"]
 
 
-def test_an_interrupted_write_leaves_the_old_file_and_nothing_beside_it(whole_file, tmp_path):
+def test_an_interrupted_write_leaves_nothing_but_the_old_file(whole_file, tmp_path):
     (tmp_path / "a.txt").write_text(OLD)
     with pytest.raises(KeyboardInterrupt), whole_file.replacing(tmp_path / "a.txt") as temporary:
         temporary.write_text("half of")

@@ -212,7 +212,7 @@ def test_a_target_that_depends_on_the_probe_does_not_become_its_parent(empty, ex
     assert probe.parent is None
 
 
-def test_a_probe_that_stands_alone_touches_a_target_that_was_moved(empty, touches):
+def test_a_probe_without_a_parent_touches_a_target_that_was_moved(empty, touches):
     empty.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=2.0)
     ball = empty.context.object
     probe, _ = pick(empty, TOP, parent=False)

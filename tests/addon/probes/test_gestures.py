@@ -26,7 +26,7 @@ def gesture(extension, monkeypatch):
 
 @pytest.fixture
 def ridge(empty):
-    """The active object: a sheet, 2 wide, that is nearly flat beside a ridge along y."""
+    """The active object: a sheet, 2 wide, that is nearly flat except for a ridge along y."""
     empty.ops.mesh.primitive_grid_add(x_subdivisions=200, y_subdivisions=200, size=2.0)
     obj = empty.context.object
     co = np.empty((len(obj.data.vertices), 3), dtype=np.float32)

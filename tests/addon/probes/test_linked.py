@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Probes and patches of a library: grayed out and left alone where they are linked, alive as overrides."""
+"""Probes and patches of a library: grayed out and unchanged where they are linked, alive as overrides."""
 
 import math
 
@@ -47,7 +47,7 @@ def test_what_writes_is_gray_on_linked_data_and_says_why(empty, library, name, a
     assert empty.data.objects["Sphere Patch"]["tactile"].to_dict() == before
 
 
-def test_a_linked_probe_is_not_moved_but_another_may_be_picked_beside_it(empty, library):
+def test_a_linked_probe_is_not_moved_but_another_may_be_picked_next_to_it(empty, library):
     linked = empty.data.objects["Sphere Probe"]
     empty.context.view_layer.objects.active = linked
     assert LIBRARY in refusal(empty.ops.tactile.pick, location=(1.9, 0.3, 0.4))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Patches and time: other frames, other scenes, and edits that no handler was told of.
+"""Patches and time: other frames, other scenes, and edits during which no handler ran.
 
 A patch follows, or says that it is from an earlier touch; it never says that all is well where it is not.
 """

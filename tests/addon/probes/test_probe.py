@@ -367,7 +367,7 @@ def test_the_patch_follows_its_target(empty, ball, change, height, radius):
     assert datablocks(empty) == blocks
 
 
-def test_what_does_not_concern_the_probe_leaves_its_patch_alone(empty, ball):
+def test_what_does_not_concern_the_probe_does_not_change_its_patch(empty, ball):
     probe, patch = pick(empty)
     empty.ops.mesh.primitive_cube_add(location=(9.0, 0.0, 0.0))
     cube, digest = empty.context.object, probe.tactile_probe.digest

@@ -71,7 +71,7 @@ def in_panel(bpy, owner, name, value):
 
 
 def rest(bpy):
-    """Stores a step of undo without a change: undo keeps in memory what the next step leaves alone."""
+    """Stores a step of undo without a change: undo keeps in memory what the next step does not change."""
     bpy.ops.ed.undo_push(message="rest")
 
 

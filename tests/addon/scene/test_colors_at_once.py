@@ -50,15 +50,15 @@ def test_patches_share_a_range_and_may_be_given_one(empty, ball):
     other.tactile_colors = "mean_curvature"
     own.append(patches[1]["tactile"]["color_limit"])
     assert own[1] > 2.0 * own[0]
-    assert patches[0]["tactile"]["color_limit"] == own[1]  # They share it without being asked.
+    assert patches[0]["tactile"]["color_limit"] == own[1]  # They share it without Share Range.
     empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, location=(9, 0, 0))
-    empty.context.object.name = "Alone"
-    empty.ops.tactile.reconstruct(target="Alone", location=(9, 0, 1), extent=0.4)
+    empty.context.object.name = "Distant"
+    empty.ops.tactile.reconstruct(target="Distant", location=(9, 0, 1), extent=0.4)
     assert empty.context.object["tactile"]["color_limit"] < own[1]  # Another object has a range of its own.
     empty.context.view_layer.objects.active = patches[0]
     assert empty.ops.tactile.share_range() == {"FINISHED"}  # and says: 2 patches have one range of colors
     assert [patch["tactile"]["color_limit"] for patch in patches] == [max(own)] * 2
-    assert empty.data.objects["Alone Patch"]["tactile"]["color_limit"] == max(own)
+    assert empty.data.objects["Distant Patch"]["tactile"]["color_limit"] == max(own)
     assert "tactile_color_range" not in other
     patches[0].tactile_range = 2e-6  # in 1/mm², as the legend has it
     assert patches[0]["tactile"]["color_limit"] == pytest.approx(2.0, rel=1e-6)

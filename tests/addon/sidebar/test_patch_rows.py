@@ -34,7 +34,7 @@ def record(status="ok", message="The patch describes its contacts.", **more):
     return {"status": status, "message": message, "height_std": 0.0123, **more}
 
 
-def test_a_number_that_is_only_rounding_beside_its_deviation_is_0(extension):
+def test_a_number_that_is_only_rounding_compared_with_its_deviation_is_0(extension):
     units = extension.tactile_addon.touch.units
     assert units.say(3.34e-7, -1, UNIT, 7e-4) == "0 ± 0.0007 1/mm"
     assert units.say(-0.002, -1, UNIT, 7e-4) == "-0.002 ± 0.0007 1/mm"
@@ -122,12 +122,12 @@ def test_a_length_that_is_dragged_in_a_dialog_is_the_operators_own(empty, extens
 
 
 @pytest.mark.parametrize("operator", ["pick", "reconstruct", "add_planes"])
-def test_what_blender_logs_has_no_properties_beside_the_inputs(empty, operator):
+def test_what_blender_logs_has_no_properties_except_the_inputs(empty, operator):
     kind = getattr(empty.ops.tactile, operator).get_rna_type()
     assert not [name for name in kind.properties.keys() if "_by_" in name]  # noqa: SIM118
 
 
-def test_what_was_found_stands_beside_auto(said, empty, ball):
+def test_what_was_found_stands_next_to_auto(said, empty, ball):
     _, report = ball
     scene = empty.context.scene
     found = said.found_values(report, scene)
@@ -138,7 +138,7 @@ def test_what_was_found_stands_beside_auto(said, empty, ball):
     assert said.found_values(None, scene) == said.found_values(report | {"status": "outdated"}, scene) == {}
 
 
-def test_rows_are_told_apart_by_how_they_begin(said, ball):
+def test_rows_are_distinguished_by_how_they_begin(said, ball):
     _, report = ball
     rows = said.main_rows(report, UNIT) + said.other_rows(report, UNIT)
     labels = [label for label, value in rows if value]  # a heading has no value
@@ -214,7 +214,7 @@ class Layout:
 @pytest.mark.parametrize(
     "width, line", [(250, ["K", "", "0.00312 ± 0.002 1/mm²"]), (300, ["K", "0.00312 ± 0.002 1/mm²"])]
 )
-def test_a_value_that_has_no_room_beside_its_label_stands_below_it(extension, width, line):
+def test_a_value_that_has_no_room_next_to_its_label_stands_below_it(extension, width, line):
     context = SimpleNamespace(
         preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)), region=SimpleNamespace(width=width)
     )

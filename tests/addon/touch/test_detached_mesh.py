@@ -49,7 +49,7 @@ def edit(bpy, obj):
         (edit, "Touching was stopped because Object Mode was left: start it again"),
     ],
 )
-def test_a_target_that_does_not_stay_is_told_at_once(empty, ball, taken, disturb, message):
+def test_a_target_that_does_not_stay_is_reported_at_once(empty, ball, taken, disturb, message):
     disturb(empty, ball)
     empty.context.view_layer.update()
     for require in (taken.require_source, taken.require_same):
@@ -58,7 +58,7 @@ def test_a_target_that_does_not_stay_is_told_at_once(empty, ball, taken, disturb
 
 
 @pytest.mark.parametrize("how", ["vertex", "modifier"])
-def test_another_shape_is_told_soon_and_for_sure_in_the_end(empty, ball, taken, how):
+def test_another_shape_is_noticed_soon_and_for_sure_in_the_end(empty, ball, taken, how):
     if how == "vertex":
         ball.data.vertices[0].co.x += 1e-3
         ball.data.update()

@@ -130,7 +130,7 @@ def test_no_patch_across_an_edge_or_a_rib(empty, extension, scans, name, noise):
     for at in faces[chosen, :3]:
         try:
             touched = add_on.touch.touch_object.touch(obj, depsgraph, at, planes, **inputs)
-        except ValueError:  # there is no patch on a crease or beside one
+        except ValueError:  # there is no patch on a crease or near one
             continue
         touched = add_on.touch.touch_object.completed(touched)
         if touched.report["status"] == "ok":

@@ -170,15 +170,15 @@ def test_the_contours_are_an_object_of_their_own(empty, ball):
 
 def test_vertices_under_another_layer_are_no_part_of_the_verification(empty, ball):
     """Balls within the ball, all facing outward: only the outer one can be felt."""
-    _, alone = reconstruct(empty, **TOUCH)
+    _, single = reconstruct(empty, **TOUCH)
     shells = bmesh.new()
     for radius in (RADIUS, 0.9 * RADIUS, 0.8 * RADIUS):
         shells.from_mesh(ball.data)
         bmesh.ops.scale(shells, vec=[radius / RADIUS] * 3, verts=shells.verts[-len(ball.data.vertices) :])
     shells.to_mesh(ball.data)
     _, nested = reconstruct(empty, target="Sphere", **TOUCH)
-    assert nested["vertices"] == alone["vertices"]
-    assert nested["vertex_distance_max"] == pytest.approx(alone["vertex_distance_max"])
+    assert nested["vertices"] == single["vertices"]
+    assert nested["vertex_distance_max"] == pytest.approx(single["vertex_distance_max"])
 
 
 def test_a_mesh_without_vertices_over_the_patch_says_so(empty, extension):
@@ -523,7 +523,7 @@ def test_bad_input_gets_a_sentence_and_leaves_nothing(empty, ball, spoil, change
     assert datablocks(empty) == before
 
 
-def test_a_name_of_two_lines_is_told_in_one(empty, ball):
+def test_a_name_of_two_lines_is_reported_in_one(empty, ball):
     ball.name = "two\nlines"
     with pytest.raises(RuntimeError, match='away from "two lines", farther than'):
         empty.ops.tactile.reconstruct(target=ball.name, location=(0.0, 0.0, 9.0), extent=0.6)

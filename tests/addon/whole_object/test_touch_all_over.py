@@ -58,7 +58,7 @@ def test_colors_show_what_is_chosen(empty, ball, extension):
         assert surface["tactile_object"]["color_limit"] == pytest.approx(max(wild, least), rel=1e-5)
 
 
-def test_beside_the_edges_of_a_cube_curvatures_are_unknown_and_gray(empty, extension):
+def test_near_the_edges_of_a_cube_curvatures_are_unknown_and_gray(empty, extension):
     empty.ops.mesh.primitive_cube_add(size=2.0)
     surface, record = touched(empty)
     mesh, gray = surface.data, extension.tactile_addon.scene.colors.linear([(0.5, 0.5, 0.5, 1.0)])[0]

@@ -69,8 +69,8 @@ def test_what_the_mesh_hides_does_not_count(empty, ball):
     assert record["deviation_max"] < 0.01
 
 
-def test_what_touches_bridge_is_told(empty, extension, ball, touches_of):
-    """A dent beside the surface, which is made after the touches, because these would feel it."""
+def test_what_touches_bridge_is_reported(empty, extension, ball, touches_of):
+    """A dent next to the surface, which is made after the touches, because these would feel it."""
     touches = touches_of(ball, tolerance=0.02)
     for _ in touches.steps():
         pass
@@ -89,8 +89,8 @@ def test_what_touches_bridge_is_told(empty, extension, ball, touches_of):
     assert report["deviation_max"] == pytest.approx(0.5, abs=0.1)
     assert report["deviation_place"][2] > 1.4
     assert report["status"] == "uncertain"
-    told = "off the object, which the tolerance does not explain: use"
-    assert report["message"].endswith(f"{told} a smaller tolerance.")
+    advice = "off the object, which the tolerance does not explain: use"
+    assert report["message"].endswith(f"{advice} a smaller tolerance.")
     atlas = touches.whole.atlas
     touches.whole.atlas = replace(atlas, tolerance=1e-5)
     assert touches.report()["message"].endswith(f"off the object. {touches.whole.atlas.message}")
@@ -103,7 +103,7 @@ def test_what_touches_bridge_is_told(empty, extension, ball, touches_of):
     open_edges = "whose mesh has open edges, as around holes: close them, or use a smaller tolerance."
     assert touches.report()["message"].endswith(open_edges)
     touches.edge = 0.5
-    assert touches.report()["message"].endswith(f"{told} a shorter edge length.")
+    assert touches.report()["message"].endswith(f"{advice} a shorter edge length.")
 
 
 def test_without_an_edge_length_the_mesh_is_that_of_the_distances(ball, touches_of):
@@ -138,12 +138,12 @@ def test_closed_is_the_mesh_that_is_shown(extension, left_out, shown, uncovered,
     whole.mesh, whole.curvatures = mesh(shown), {"mean_curvature_std": np.array([0.1, np.inf, 0.1, 0.1])}
     report = whole.report()
     assert (report["status"], report["is_closed"]) == (status, is_closed)
-    told = OK if status == "ok" else "Triangles of this edge length leave holes: use a shorter edge length."
-    assert report["message"] == told
+    words = OK if status == "ok" else "Triangles of this edge length leave holes: use a shorter edge length."
+    assert report["message"] == words
     rows = extension.tactile_addon.whole_object.object_report.object_rows
-    told = dict(rows(report | {"tolerance": 0.1, "uncovered": len(uncovered)}))
-    assert told["… without K"] == "1"
-    assert told["Surface"] == ("Closed" if is_closed else "Incomplete" if uncovered else "Open")
+    shown_rows = dict(rows(report | {"tolerance": 0.1, "uncovered": len(uncovered)}))
+    assert shown_rows["… without K"] == "1"
+    assert shown_rows["Surface"] == ("Closed" if is_closed else "Incomplete" if uncovered else "Open")
 
 
 @pytest.fixture
@@ -193,7 +193,7 @@ def test_once_stopped_it_touches_no_more(balls, touches_of, word):
     assert len(touches.found) == len(touches.whole.atlas.patches)
 
 
-def test_who_stops_it_is_not_told_to_allow_more_touches(ball, touches_of):
+def test_who_stops_it_gets_no_advice_to_allow_more_touches(ball, touches_of):
     touches = touches_of(ball, tolerance=0.02)
     for _ in touches.steps():
         if touches.done >= 3:

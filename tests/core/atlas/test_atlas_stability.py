@@ -26,7 +26,7 @@ def test_rounding_chooses_no_touch(rounding):
 
 
 class Outlying:
-    """A solid that every tenth ray meets beside its surface."""
+    """A solid that every tenth ray meets off its surface."""
 
     def __init__(self, solid, off):
         self.solid, self.off, self.count = solid, off, 0

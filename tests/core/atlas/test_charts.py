@@ -49,8 +49,8 @@ def test_pairs_are_those_of_each_place_and_each_patch_alone(charts, near):
     together = list(zip(found.point_index.tolist(), found.patch.tolist(), strict=True))
     assert sorted(together) == sorted((at, patch) for at, patch, _ in one_by_one)
     assert (np.diff(found.point_index) >= 0).all()
-    alone = {(at, patch): d for at, patch, d in one_by_one}
-    assert found.distance == pytest.approx([alone[pair] for pair in together], abs=1e-12)
+    distances = {(at, patch): d for at, patch, d in one_by_one}
+    assert found.distance == pytest.approx([distances[pair] for pair in together], abs=1e-12)
 
 
 @pytest.mark.parametrize(("unit", "shift"), [(1e-6, 0.0), (1e6, 0.0), (1.0, 1e6)])

@@ -59,7 +59,7 @@ def test_a_plane_is_flat_and_a_cylinder_bends_one_way():
     known = np.isfinite(found.mean_std)
     assert (gauss, mean) == pytest.approx((0.0, 0.0), abs=1e-12)
     assert np.abs([found.gauss, found.mean]).max() < 1e-12
-    assert 0.7 < known.mean() < 1.0  # Beside the rim they are unknown.
+    assert 0.7 < known.mean() < 1.0  # Near the rim they are unknown.
     gauss, mean, found = tip_of(lambda x, y: np.sqrt(9.0 - x**2))
     assert gauss == pytest.approx(0.0, abs=1e-3)
     assert mean == pytest.approx(-1.0 / 6.0, rel=0.01)
@@ -91,8 +91,8 @@ def test_a_fold_is_a_crease_from_thirty_degrees_on():
         steep = np.tan(np.radians(0.5 * degrees))
         mesh = grid(lambda x, y, steep=steep: -steep * np.abs(x))
         found = found_on(mesh)
-        beside = (np.abs(mesh.vertices[:, 0]) < 0.08) & (np.abs(mesh.vertices[:, 1]) < 0.7)
-        assert (np.isinf(found.mean_std[beside]) == gray).all()
+        near = (np.abs(mesh.vertices[:, 0]) < 0.08) & (np.abs(mesh.vertices[:, 1]) < 0.7)
+        assert (np.isinf(found.mean_std[near]) == gray).all()
         away = (np.abs(np.abs(mesh.vertices[:, 0]) - 0.5) < 0.2) & (np.abs(mesh.vertices[:, 1]) < 0.7)
         assert np.isfinite(found.mean_std[away]).all()
         assert not gray or np.abs(found.mean[away]).max() < 1e-9
@@ -103,7 +103,7 @@ def test_another_sheet_nearby_does_not_count():
     low = grid(lambda x, y: 0.2 * (x**2 + y**2), std=3e-4)
     high = grid(lambda x, y: 0.0 * x + 0.15)
     back = low._replace(vertices=low.vertices - [0.0, 0.0, 0.02], triangles=low.triangles[:, ::-1])
-    count, alone = len(low.vertices), found_on(low)
+    count, single = len(low.vertices), found_on(low)
     every = core.Mesh(
         np.vstack([mesh.vertices for mesh in (low, high, back)]),
         np.vstack([mesh.triangles + i * count for i, mesh in enumerate((low, high, back))]),
@@ -112,8 +112,8 @@ def test_another_sheet_nearby_does_not_count():
     )
     middle = (np.abs(low.vertices[:, :2]) < 0.3).all(axis=1)
     together = found_on(every)
-    assert together.mean[:count][middle] == pytest.approx(alone.mean[middle], rel=0.05)
-    assert together.mean[2 * count :][middle] == pytest.approx(-alone.mean[middle], rel=0.05)
+    assert together.mean[:count][middle] == pytest.approx(single.mean[middle], rel=0.05)
+    assert together.mean[2 * count :][middle] == pytest.approx(-single.mean[middle], rel=0.05)
 
 
 def test_curvatures_are_near_and_their_deviations_hold(touched):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How many touches an object is expected to take, beside how many it takes."""
+"""How many touches an object is expected to take, compared with how many it takes."""
 
 import numpy as np
 import pytest

@@ -31,12 +31,12 @@ def frontier(first):
     return found
 
 
-def test_places_at_once_have_the_touches_of_each_alone(frontier):
+def test_places_at_once_have_the_touches_of_single_places(frontier):
     places = [place for _, _, place in frontier.queue]
     together = frontier.beyond(places)
-    alone = [frontier.beyond([place])[0] for place in places]
+    singles = [frontier.beyond([place])[0] for place in places]
     assert len(places) == 24
-    for a, b in zip(together, alone, strict=True):
+    for a, b in zip(together, singles, strict=True):
         assert a.gain == b.gain > 0.0
         assert (a.point == b.point).all()
         assert abs(BALL.distances(a.point[None])[0]) < 1e-9
@@ -108,10 +108,10 @@ def test_a_patch_ends_where_the_finger_feels_that_the_surface_does():
     points, _ = charts.world(np.zeros(AZIMUTHS, dtype=int), x, y)
     ends, notch = points[:, 0] - EDGE, (points[:, 1] - 0.2 - np.abs(points[:, 0] - 0.1)) / np.sqrt(2.0)
     assert max(ends.max(), notch.max()) < 0.02
-    beside = np.abs(np.degrees(np.arctan2(points[:, 1], points[:, 0])) + 10.0) < 30.0
-    assert beside.sum() > 10
+    near = np.abs(np.degrees(np.arctan2(points[:, 1], points[:, 0])) + 10.0) < 30.0
+    assert near.sum() > 10
     # A domain that ends far before the border stays as it is.
-    assert np.median(np.abs(ends[beside])) < 0.003
+    assert np.median(np.abs(ends[near])) < 0.003
 
 
 def test_contacts_between_curves_are_on_the_surface_and_have_the_noise(first):

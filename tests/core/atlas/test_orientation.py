@@ -36,10 +36,10 @@ def box(sizes, gap):
     return strokes, np.vstack(normals)
 
 
-def outward(strokes, **told):
+def outward(strokes, **options):
     points = np.vstack(strokes)
     planes = planes_of(points, 0.0)
-    normals = oriented(strokes, planes, **told)
+    normals = oriented(strokes, planes, **options)
     return normals, doubt_of(points, normals, planes)
 
 

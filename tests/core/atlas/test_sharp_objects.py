@@ -180,7 +180,7 @@ def test_far_away_and_outside_of_the_grid_the_side_is_right(block):
 
 
 def test_a_block_is_right_and_ok_from_any_start():
-    """Starts on a face beside an edge, and on other faces."""
+    """Starts on a face near an edge, and on other faces."""
     starts = [((0.99, 0.0, 0.5), (0, 0, 1)), ((-1.0, 0.5, 0.4), (-1, 0, 0)), ((0.3, 0.7, -0.3), (0, 1, 0))]
     for point, outward in starts:
         atlas = core.explore_object(BLOCK, point, outward, tolerance=TOLERANCE, noise=1e-3, rng=1)

@@ -36,7 +36,7 @@ def fitted(contacts, normals, noise=5e-4):
     return smoothing_spline(contacts, normals, np.ones(len(contacts)), HALF, noise)
 
 
-def told(coefficients, x, y):
+def evaluated(coefficients, x, y):
     """The heights of a spline and its slopes along x and y, (3, n)."""
     knots, basis = bases(x, y, HALF)
     return (basis * coefficients.ravel()[knots]).sum(axis=2)
@@ -45,7 +45,7 @@ def told(coefficients, x, y):
 def misses(spline, height, rng):
     """How far the spline is off at random points, and the deviations at the knots nearest to these."""
     x, y, _ = touched(height, rng, 200)[0].T
-    off = told(spline.coefficients, x, y)[0] - height(x, y)[0]
+    off = evaluated(spline.coefficients, x, y)[0] - height(x, y)[0]
     knots = np.rint((np.array([x, y]) / HALF + 1.0) * 0.5 * (SIDE - 1)).astype(int)
     return off, spline.stds[knots[0], knots[1]]
 
@@ -63,10 +63,10 @@ def test_slopes_are_those_of_the_heights():
     rng = np.random.default_rng(1)
     coefficients, step = rng.normal(size=SIDE**2), 1e-5
     x, y = rng.uniform(-1.0, 1.0, (2, 50))
-    _, along_x, along_y = told(coefficients, x, y)
+    _, along_x, along_y = evaluated(coefficients, x, y)
 
     def height(x, y):
-        return told(coefficients, x, y)[0]
+        return evaluated(coefficients, x, y)[0]
 
     expected = (height(x + step, y) - height(x - step, y)) / (2.0 * step)
     assert along_x == pytest.approx(expected, abs=1e-6)
@@ -83,7 +83,7 @@ def test_a_tenth_of_outlying_contacts_is_ignored():
     assert np.abs(off).mean() < 1.5 * np.abs(clean).mean()
 
 
-def test_normals_help_as_far_as_they_are_true():
+def test_normals_help_as_much_as_they_are_true():
     def error(turned):
         found = []
         for seed in range(4, 10):
@@ -101,7 +101,7 @@ def dense_neg2_log_evidence(contacts, order, roughness, noise):
     """-2 log marginal likelihood of heights, less a constant, by dense matrices; planes are nearly free.
 
     Sums over all knots go without numpy's BLAS: OpenBLAS 0.3.34 overflows its stack there where a kernel
-    without AVX-512 is asked for on a processor of AMD that has it (OpenMathLib/OpenBLAS#6021).
+    without AVX-512 is selected on a processor of AMD that has it (OpenMathLib/OpenBLAS#6021).
     """
     knots, basis = bases(contacts[:, 0], contacts[:, 1], HALF)
     rows = np.zeros((len(contacts), SIDE**2))
@@ -154,11 +154,11 @@ def weathered(x, y):
 def test_a_folded_surface_has_random_second_derivatives_and_a_smooth_one_third(height, order, monkeypatch):
     orders, coefficients = [], splines._Solution.coefficients
 
-    def asked(found):
+    def recorded(found):
         orders.append(found.hyperparameters.order)
         return coefficients(found)
 
-    monkeypatch.setattr(splines._Solution, "coefficients", asked)
+    monkeypatch.setattr(splines._Solution, "coefficients", recorded)
     fitted(*touched(height, np.random.default_rng(6), 300, 5e-4, 0.02))
     assert orders[-1] == order
 

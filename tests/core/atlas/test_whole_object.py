@@ -70,7 +70,7 @@ def test_edges_that_take_gigabytes_are_refused_at_once(ball):
         ball.mesh(1e-49)
 
 
-def test_triangles_face_outward_and_are_as_large_as_asked(ball):
+def test_triangles_face_outward_and_are_as_large_as_requested(ball):
     mesh = ball.mesh(0.08)
     a, b, c = (mesh.vertices[mesh.triangles[:, i]] for i in range(3))
     assert (np.einsum("ni,ni->n", np.cross(b - a, c - a), a) > 0.0).all()
@@ -145,7 +145,7 @@ def test_at_the_point_the_deviation_of_the_bend_is_that_of_the_reconstruction(ri
     assert std[0] == pytest.approx(r.gaussian_curvature_std, rel=0.05)
 
 
-def test_patches_are_as_certain_as_asked(ball, ring):
+def test_patches_are_as_certain_as_requested(ball, ring):
     for atlas in (ball, ring):
         assert atlas.charts.mean_stds.max() <= atlas.tolerance
         assert [
@@ -179,25 +179,25 @@ def test_edges_that_were_felt_on_both_sides_are_closed(block):
 
 
 def test_progress_can_end_it_with_what_is_there():
-    told = []
+    calls = []
 
     def progress(done, uncovered):
-        told.append((done, uncovered))
+        calls.append((done, uncovered))
         return done < 5
 
     solid = solids.ball()
     atlas = explored(solid, progress=progress)
     assert 5 <= len(atlas.patches) <= 8
-    assert told[-1][0] == len(atlas.patches)
+    assert calls[-1][0] == len(atlas.patches)
     assert "allow more touches" in atlas.message
     assert solids.topology(atlas.mesh(0.1).triangles).open > 0
 
 
 @pytest.mark.parametrize("answer", [False, np.False_, 0])
 def test_whatever_is_false_except_none_stops_it(answer):
-    told = []
-    explored(solids.ball(), progress=lambda done, _: (told.append(done), answer)[1])
-    assert told == [1]
+    calls = []
+    explored(solids.ball(), progress=lambda done, _: (calls.append(done), answer)[1])
+    assert calls == [1]
 
 
 def test_a_small_budget_leaves_places_uncovered_and_says_where_to_go_on():
@@ -259,14 +259,14 @@ def test_contacts_off_the_surface_put_it_in_doubt(ball):
     assert wrong.message.startswith("2 of 50 rays from outside meet something else than the surface")
     missed = replace(ball, check=Check(ways[:49], ways[:49], ways[49:], 49))
     assert missed.message.startswith("1 of 50 rays from outside meet something else")
-    beside = ways * np.where(np.arange(50) < 20, 1.004, 1.0)[:, None]
-    loose = replace(ball, check=Check(beside, ways, np.zeros((0, 3)), len(beside)))
+    shifted = ways * np.where(np.arange(50) < 20, 1.004, 1.0)[:, None]
+    loose = replace(ball, check=Check(shifted, ways, np.zeros((0, 3)), len(shifted)))
     assert not loose.contradicting.any()
     wide = result_of(loose.widened())
-    distance, std = wide.distance(beside)
+    distance, std = wide.distance(shifted)
     assert np.mean(np.abs(distance) <= 1.645 * std * 1.001) >= 0.9
     # What patches differ by is a part of a deviation and does not grow with theirs.
-    factor, grown = wide.charts.stds / loose.charts.stds, std / loose.distance(beside)[1]
+    factor, grown = wide.charts.stds / loose.charts.stds, std / loose.distance(shifted)[1]
     assert factor == pytest.approx(factor.mean(), rel=1e-9)
     assert grown.max() <= factor.max() * (1.0 + 1e-9)
     assert np.median(grown) == pytest.approx(factor.mean(), rel=0.02)

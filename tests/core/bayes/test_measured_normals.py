@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measured normals as slopes in the Bayesian fit: they show what curves alone cannot."""
+"""Measured normals as slopes in the Bayesian fit: they show what curves without normals cannot."""
 
 from dataclasses import replace
 from functools import cache
@@ -58,7 +58,7 @@ def test_a_monkey_saddle_hidden_from_its_planes_shows_in_normals(noise, std):
     contours = touched(HIDDEN, noise)
     fits = (HIDDEN.fit(c, degree=4) for c in (contours, measured(contours, std)))
     without, with_normals = fits
-    assert (without.blind, with_normals.blind) == (3, 0)
+    assert (without.null_space_dimension, with_normals.null_space_dimension) == (3, 0)
     assert "cannot show" not in with_normals.message
     assert surfaces.off_data(HIDDEN, with_normals) < 0.1 * surfaces.off_data(HIDDEN, without)
 
@@ -112,7 +112,7 @@ def test_the_papers_methods_ignore_them(method):
     assert one.mean_height_std == other.mean_height_std
 
 
-def test_touches_with_and_without_normals_in_one_call_are_as_alone():
+def test_touches_with_and_without_normals_in_one_call_are_as_single_ones():
     surface = surfaces.torus(40, 20, 0.6)
     contours = touched(surface, 0.05)
     some = [*measured(contours[:1], 0.02), *contours[1:]]
@@ -215,7 +215,7 @@ def contradicts(r):
 
 
 @pytest.mark.parametrize("std", [0.0, 0.02])
-def test_normals_in_another_frame_than_the_contacts_are_told(std):
+def test_normals_in_another_frame_than_the_contacts_are_reported(std):
     for number, surface in enumerate(EXACT):
         contours = measured(touched(surface, 0.02, number), std, number)
         for degrees in (-5.0, 5.0):
@@ -226,7 +226,7 @@ def test_normals_in_another_frame_than_the_contacts_are_told(std):
     assert "check the frame they were measured in, or leave them out" in r.message
 
 
-def test_mirrored_normals_are_told_though_they_are_right_in_the_mean():
+def test_mirrored_normals_are_reported_though_they_are_right_in_the_mean():
     surface = surfaces.sphere(35)
     contours = touched(surface, 0.02)
     axes = surface.fit(contours).frame.axes
@@ -257,7 +257,7 @@ def scattered(r):
 
 
 @pytest.mark.parametrize("std", [0.005, 0.01, 0.02, 0.05, 0.1])
-def test_random_normals_are_told(std):
+def test_random_normals_are_reported(std):
     for number, surface in enumerate(EXACT):
         for seed in range(3):
             rng = np.random.default_rng([number, seed])
@@ -272,7 +272,7 @@ def test_random_normals_are_told(std):
 
 
 @pytest.mark.parametrize("std", [0.01, 0.05])
-def test_normals_that_are_mirrored_at_every_second_contact_are_told(std):
+def test_normals_that_are_mirrored_at_every_second_contact_are_reported(std):
     for seed, surface in enumerate((surfaces.sphere(20), surfaces.torus(40, 15, 0.6), surfaces.cylinder(15))):
         up, contours = surface.normal, []
         for c in measured(touched(surface, 0.05, seed), std, seed):
@@ -356,10 +356,10 @@ def test_too_few_normals_contradict_nothing():
     surface = surfaces.pear()
     r = surface.fit(touched(surface, 0.02))
     contacts = r.contacts / r.radius
-    for count, told in ((0, False), (2, False), (30, True)):
+    for count, contradicts in ((0, False), (2, False), (30, True)):
         normals = np.tile([60.0, 0.0, 80.0], (count, 1))
         deviations, angle = contradiction(contacts[:count], normals, r.posterior)
-        assert (deviations > 5.0, angle > 0.5) == (told, told)
+        assert (deviations > 5.0, angle > 0.5) == (contradicts, contradicts)
 
 
 @pytest.mark.parametrize(

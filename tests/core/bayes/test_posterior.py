@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Bayesian fit: its algebra, its accuracy, and that it knows what it cannot see."""
+"""The Bayesian fit: its algebra, its accuracy, and wide intervals where contacts show nothing."""
 
 from dataclasses import replace
 
@@ -42,8 +42,8 @@ def test_intervals_count_in_that_waviness_and_noise_are_estimates(count, freedom
     hyper = data.hyperparameters(np.array([2e-3]))
     found = sextic.posterior_given(expected, data, hyper).at(0).covariance
     precision = data.heights[0, :-1, :-1] / hyper.noise**2 + np.diag(1.0 / hyper.prior[0])
-    alone = np.linalg.inv(precision)
-    assert found == pytest.approx(freedom / (freedom - 2.0) * alone, rel=1e-6)
+    gaussian = np.linalg.inv(precision)
+    assert found == pytest.approx(freedom / (freedom - 2.0) * gaussian, rel=1e-6)
 
 
 def test_deviations_of_curvatures_are_those_of_surfaces_at_random():
@@ -222,7 +222,7 @@ def test_many_contacts_suggest_what_fewer_of_less_noise_do(monkeypatch):
     contours = track(s, s.point, s.normal, THREE, extent=12, step=0.1, noise=0.03, rng=0)
     r = reconstruct(s.point, contours, outward=s.normal)
     plane, expected = suggest_plane(r)
-    monkeypatch.setattr("core.reconstruction.next_plane.TELLING_CONTACTS", 1000)
+    monkeypatch.setattr("core.reconstruction.next_plane.MOST_CONTACTS", 1000)
     all_of_them = suggest_plane(r)
     assert plane == all_of_them[0]
     assert expected == pytest.approx(all_of_them[1], rel=0.01)
@@ -350,11 +350,11 @@ def test_a_degree_will_do_whose_patch_departs_by_half_a_deviation(ratio, degree)
     contacts = np.column_stack([rng.uniform(-0.9, 0.9, (50, 2)), np.zeros(50)])
     mean = np.zeros(27)
     mean[14] = 0.1
-    alone = posterior.SurfacePosterior(mean, np.eye(28), 0.0, np.zeros((22, 22)))
+    uncertain = posterior.SurfacePosterior(mean, np.eye(28), 0.0, np.zeros((22, 22)))
     basis = monomials(contacts[:, 0], contacts[:, 1], TERMS)
-    off = basis @ (mean - posterior.coefficients_of(alone.patch(4)))
+    off = basis @ (mean - posterior.coefficients_of(uncertain.patch(4)))
     variance = np.sum(off**2) / ratio**2 / np.sum(basis**2)
-    assert replace(alone, root=np.sqrt(variance) * np.eye(28)).degree_shown(contacts) == degree
+    assert replace(uncertain, root=np.sqrt(variance) * np.eye(28)).degree_shown(contacts) == degree
 
 
 def test_an_outlying_contact_weighs_as_under_students_distribution():
@@ -391,7 +391,7 @@ def test_the_suggested_plane_is_nearly_the_best_of_all_that_there_are():
         count, noise = len(r.contacts) / 3, r.posterior.noise**2
 
         def lost_at_all(most, c=covariances, weights=weights, count=count, noise=noise):
-            return next_plane._lost(c, next_plane.TRIED, most, noise * most / count) @ weights
+            return next_plane._variance_reduction(c, next_plane.TRIED, most, noise * most / count) @ weights
 
         lost, few = lost_at_all(round(count)), lost_at_all(next_plane.FEW_CONTACTS)
         plane, _ = suggest_plane(r)
@@ -488,7 +488,7 @@ def test_a_height_at_the_origin_that_is_open_varies_with_the_terms():
     assert some.height_covariance(points, points) == pytest.approx(wanted)
 
 
-def test_a_stack_whose_touches_settle_one_after_the_other_gives_what_each_gives_alone():
+def test_a_stack_whose_touches_settle_one_after_the_other_gives_what_single_fits_give():
     s = surfaces.torus(40, 20, 0.6)
     clean = s.track(THREE, noise=0.02, rng=0)
     points = clean[1].points.copy()

@@ -25,7 +25,7 @@ from core.bayes.prior import USUAL_WAVINESS, prior_variances
 from core.bayes.process_fit import process_posterior, touch_of
 from core.patch.monge import TERMS, exponents, monomials
 from core.reconstruction.deviations import mean_height_stds
-from core.reconstruction.next_plane import TRIED, _lost
+from core.reconstruction.next_plane import TRIED, _variance_reduction
 
 EXTENT = 12.0
 OUTWARD = np.array([0.0, 0.0, 1.0])
@@ -75,7 +75,7 @@ def test_kernels_are_materns_of_each_length(monkeypatch, lengths):
 
 
 @pytest.mark.parametrize("weight", [1.0, 0.3])
-def test_the_mean_alone_is_that_of_the_posterior(weight):
+def test_the_mean_by_itself_is_that_of_the_posterior(weight):
     flat = np.vstack([np.outer(REACHES[::2], [np.cos(a), np.sin(a)]) for a in np.radians([0, 60, 120])])
     contacts = np.column_stack([flat, rough(3)(flat)])
     weights = np.where(np.arange(len(flat)) % 5, 1.0, weight)
@@ -205,7 +205,7 @@ def test_exact_surfaces_ask_for_none(surface, noise):
     assert r.height(x, y) == pytest.approx(surface.fit(contours, degree=6).patch.height(x, y), abs=1e-9)
 
 
-def test_white_noise_that_nobody_told_of_is_no_process():
+def test_white_noise_of_unknown_deviation_is_no_process():
     s, sizes = surfaces.sphere(25), []
     for seed in range(10):
         contours = s.track(surfaces.UPRIGHT, extent=EXTENT, step=1.0, noise=0.1, rng=seed)
@@ -248,7 +248,7 @@ def test_it_moves_with_its_contacts(scale):
     )
 
 
-def test_a_stack_of_rough_and_smooth_touches_gives_what_each_gives_alone():
+def test_a_stack_of_rough_and_smooth_touches_gives_what_single_fits_give():
     smooth = surfaces.graph({(2, 0): -0.01, (0, 2): 0.0075})
     exact = smooth.track(surfaces.UPRIGHT, extent=EXTENT, step=1.5)
     touches = [
@@ -264,13 +264,13 @@ def test_a_stack_of_rough_and_smooth_touches_gives_what_each_gives_alone():
     )
     points[3], outward[3] = smooth.point, smooth.normal
     found = reconstruct_many(points, touches, outward=outward)
-    alone = [reconstruct(*each, outward=n) for *each, n in zip(points, touches, outward, strict=True)]
+    singles = [reconstruct(*each, outward=n) for *each, n in zip(points, touches, outward, strict=True)]
     assert [r.posterior.amplitude > 0.0 for r in found] == [True, False, True, False, True]
-    for one, other in zip(found, alone, strict=True):
+    for one, other in zip(found, singles, strict=True):
         x, y = over(other).T
         assert one.height(x, y) == pytest.approx(other.height(x, y), abs=1e-6)
         assert one.height_std(x, y) == pytest.approx(other.height_std(x, y), rel=1e-5, abs=1e-9)
-    assert mean_height_stds(found) == pytest.approx([r.mean_height_std for r in alone], rel=1e-5)
+    assert mean_height_stds(found) == pytest.approx([r.mean_height_std for r in singles], rel=1e-5)
 
 
 def test_more_contacts_than_places_say_as_much():
@@ -303,9 +303,10 @@ def test_the_suggested_plane_tells_as_much_as_any_of_all(seed):
     points, weights = r.domain.nodes
     covariances = r.posterior.covariances_with(points / r.radius)
     widening = r.widening(r.domain.node_places)
-    told = widening**2 * _lost(covariances, TRIED, 24, r.posterior.noise**2) @ weights
+    reductions = _variance_reduction(covariances, TRIED, 24, r.posterior.noise**2)
+    lowered = widening**2 * reductions @ weights
     chosen = np.argmin(np.abs(TRIED - suggest_plane(r)[0].azimuth))
-    assert told[chosen] >= 0.97 * told.max()
+    assert lowered[chosen] >= 0.97 * lowered.max()
 
 
 def test_deviations_are_less_near_the_point_and_more_at_the_rim_and_a_contour_takes_off_as_much():
@@ -381,6 +382,6 @@ def test_the_factor_of_places_is_that_of_their_covariance():
     assert np.array_equal(factor, np.tril(factor))
 
 
-def test_contacts_beside_a_process_are_known_to_five_ten_thousandths_of_the_radius_at_best():
+def test_contacts_with_a_process_are_known_to_five_ten_thousandths_of_the_radius_at_best():
     noises = [float(touched(seed)[1].posterior.noise) for seed in range(6)]
     assert 5e-4 <= min(noises) < 1e-3

@@ -45,5 +45,5 @@ def test_noise_that_is_known_is_no_roughness():
     assert roughness(noisy, 0.001) == pytest.approx(roughness(noisy, 0.0), rel=0.02)
 
 
-def test_contacts_at_the_point_alone_are_not_rough():
+def test_contacts_at_nothing_but_the_point_are_not_rough():
     assert roughness(np.zeros((3, 3)), 0.0) == 0.0

@@ -65,7 +65,7 @@ def test_what_the_planes_cannot_show_stays_unseen(count):
     surface = SURFACES["ellipsoid"]
     contours = [Contour(points) for points in scattered(surface, count, 0.02, 1)]
     r = reconstruct(surface.point, contours, outward=surface.normal, degree=4)
-    assert r.blind == 3
+    assert r.null_space_dimension == 3
     assert max(len(contour.points) for contour in r.contours) <= MOST_CONTACTS
 
 

@@ -289,7 +289,7 @@ def test_single_precision_may_round_by_a_hundredth_of_a_curves_size(spacings, go
 
 
 @pytest.mark.parametrize("step", [0.01, 100.0])
-def test_a_ray_that_slips_between_two_faces_is_cast_again_a_thousandth_of_a_step_beside(step):
+def test_a_ray_that_slips_between_two_faces_is_cast_again_a_thousandth_of_a_step_aside(step):
     """A plate reaches five steps to each side, and no ray meets it at the reference point itself."""
 
     class Plate:

@@ -95,12 +95,12 @@ def short_waves():
 
 
 def test_what_is_too_rough_for_any_fit_to_be_trusted_is_not_fitted(monkeypatch):
-    asked = []
-    monkeypatch.setattr(side_by_side, "fitted", lambda *given: asked.append(1) or fitted(*given))
-    found, few = explore(short_waves()), len(asked)
+    fits = []
+    monkeypatch.setattr(side_by_side, "fitted", lambda *given: fits.append(1) or fitted(*given))
+    found, few = explore(short_waves()), len(fits)
     monkeypatch.setattr(growth, "ROUGHNESS_LIMIT", np.inf)
     assert explore(short_waves()).extent == found.extent
-    assert len(asked) - few > few
+    assert len(fits) - few > few
 
 
 def fits_of(monkeypatch, surface, **more):
@@ -158,7 +158,7 @@ def test_rough_curves_are_fitted_where_shorter_ones_carry_no_fit(monkeypatch):
 
 @pytest.mark.parametrize("largest_std", [None, 1.0])
 def test_among_seeds_in_doubt_the_longest_that_is_sure_is_taken(largest_std, monkeypatch):
-    """Where no deviation is asked for, a longer seed is as good as a short one in less doubt."""
+    """Where no deviation is requested, a longer seed is as good as a short one in less doubt."""
     spreads, sure = {24: 1.7, 12: 1.4, 6: 1.3, 3: 1.1}, {24: False, 12: True, 6: True, 3: False}
 
     class Trial(growth.GrowthTrial):
@@ -181,7 +181,7 @@ def test_among_seeds_in_doubt_the_longest_that_is_sure_is_taken(largest_std, mon
     assert found.counts.max() == (12 if largest_std is None else 3)
 
 
-def test_a_plane_is_felt_as_far_as_may_be_with_few_contacts():
+def test_a_plane_is_felt_to_the_largest_extent_with_few_contacts():
     found = explore(surfaces.plane(), noise=0.01, rng=0)
     assert found.extent == pytest.approx(30.0)
     assert found.step == pytest.approx(30.0 / 12.0)
@@ -277,7 +277,7 @@ def test_where_nothing_is_explained_the_patch_is_small_and_says_how_good_it_is()
     )
 
 
-def test_a_point_beside_an_edge_is_refused_as_ever():
+def test_a_point_next_to_an_edge_is_refused_as_ever():
     class Sliver:
         def ray_cast(self, origin, direction, distance):
             hit = surfaces.plane().ray_cast(origin, direction, distance)
@@ -449,7 +449,7 @@ def test_too_few_or_too_many_planes_are_refused(planes):
 
 
 @pytest.mark.parametrize("rays", [3, 40])
-def test_a_surface_that_stops_answering_is_told_in_a_sentence(rays):
+def test_a_surface_that_stops_answering_is_reported_in_a_sentence(rays):
     class Tiring:
         left = rays
 
@@ -485,7 +485,7 @@ def test_a_deviation_that_is_large_enough_ends_growth():
 
 
 @pytest.mark.parametrize(("high", "long", "std", "extent"), [(0.15, 6.0, 0.1, 2.5), (0.15, 10.0, 0.03, 2.5)])
-def test_where_a_deviation_is_asked_for_half_curves_that_begin_short_grow(high, long, std, extent):
+def test_where_a_deviation_is_requested_half_curves_that_begin_short_grow(high, long, std, extent):
     k = 2.0 * np.pi / long
     waves = surfaces.Exact(
         lambda x, y, z: z - high * np.sin(k * x) * np.cos(k * y),

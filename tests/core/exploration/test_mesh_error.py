@@ -37,7 +37,7 @@ def flat():
 
 
 @pytest.mark.parametrize("level", [0.3, -0.3, 0.0])
-def test_a_plane_that_is_off_is_as_far_off_as_it_is(flat, level):
+def test_a_plane_that_is_off_has_the_exact_distance(flat, level):
     assert core.height_error(flat, Levels((level, 1.0))) == pytest.approx(abs(level), abs=1e-6)
 
 

@@ -56,7 +56,7 @@ def mean_error(surface, r):
 
 @pytest.mark.parametrize("noise", [0.0, 0.05])
 @pytest.mark.parametrize("floor", [-4.0, 2.5])
-def test_curves_become_shorter_beside_an_edge_that_none_crosses(floor, noise):
+def test_curves_become_shorter_near_an_edge_that_none_crosses(floor, noise):
     """The edge of the plane begins 3 from the point, and curves of 30 run along both sides of it."""
     surface = Sector(floor)
     r = explore(surface, noise=noise, rng=0).result
@@ -91,7 +91,7 @@ def test_a_hole_that_no_curve_crosses_leaves_the_touch_in_doubt():
     assert f" {r.taps.missed} of {r.taps.number} taps between the curves feel no surface." in r.message
 
 
-def test_a_point_on_an_edge_is_told_to_move_away():
+def test_a_point_on_an_edge_gets_the_advice_to_move_away():
     half = Sector(None, nearest=0.0, azimuths=(0.0, 180.0))
     r = explore(half).result
     assert r.status == "uncertain"
@@ -129,7 +129,7 @@ def test_a_touch_is_in_doubt_where_the_surface_is_off_within_its_rim():
     assert core.height_error(shorter.result, pit) < 1e-6
 
 
-def test_a_small_hole_is_told_and_is_no_doubt():
+def test_a_small_hole_is_reported_and_is_no_doubt():
     r = explore(Sector(None, nearest=16.0, farthest=20.0, azimuths=(10.0, 30.0))).result
     assert r.status == "ok"
     assert r.message.startswith("The patch describes its contacts. ")
@@ -192,7 +192,7 @@ def test_many_are_judged_as_each_is(floor, nearest):
 
 
 @pytest.mark.parametrize("more", [{"extent": 20.0}, {"largest_std": 0.1}])
-def test_curves_as_long_as_asked_for_are_not_tapped_between(more):
+def test_curves_of_a_given_extent_are_not_tapped_between(more):
     assert explore(Sector(-4.0), **more).result.taps is None
 
 

@@ -185,7 +185,7 @@ def test_the_start_keeps_to_lines_between_neighboring_half_curves():
 
 
 def test_the_start_of_the_descent_joins_neighboring_half_curves_at_their_quarters():
-    """The start joins them contact by contact as far as the shorter one goes, and the last with the first."""
+    """It joins them contact by contact up to the end of the shorter one, and the last with the first."""
     rng = np.random.default_rng(6)
     angles, counts = np.radians([0, 60, 120, 180, 240, 300]), (7, 5, 7, 6, 7, 7)
     halves = [

@@ -75,8 +75,8 @@ def test_nodes_take_means_over_the_domain(ends):
 
 
 @pytest.mark.parametrize("short", [0.02, 0.1, 0.2])
-def test_beside_a_short_end_the_boundary_turns_back_nowhere(short):
-    """The spline itself does turn back, so an azimuth alone does not say how far out it is."""
+def test_next_to_a_short_end_the_boundary_turns_back_nowhere(short):
+    """The spline itself does turn back, so an azimuth does not determine how far out it is."""
     ends = circle(SIXTH) * np.array([1, 1, short, 1, 0.6, 1])[:, None]
     domain = closed_spline_domain(ends, 1.0)
     radii = np.linalg.norm(domain.boundary(3600), axis=1)

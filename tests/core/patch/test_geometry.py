@@ -36,7 +36,7 @@ def test_a_moved_patch_is_the_patch_of_moved_contacts(scale, method):
     assert moved.height_std(scale * x, scale * y) == pytest.approx(scale * r.height_std(x, y), **near)
     assert moved.contacts == pytest.approx(scale * r.contacts, **near)
     assert moved.mean_height_std == pytest.approx(scale * r.mean_height_std)
-    assert (moved.status, moved.blind) == (r.status, r.blind)
+    assert (moved.status, moved.null_space_dimension) == (r.status, r.null_space_dimension)
     for k in ("k1", "k2"):
         assert getattr(moved.patch, k) == pytest.approx(getattr(r.patch, k) / scale)
     points = np.column_stack([x, y, r.height(x, y)])

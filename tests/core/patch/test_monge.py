@@ -54,7 +54,7 @@ def test_derivatives_by_finite_differences(degree):
 
 
 def test_normal_forms_and_curvatures_from_the_parametrisation():
-    """E F G, L M N and the shape operator from differences of sigma(x, y) and of the normal alone."""
+    """E F G, L M N and the shape operator from nothing but differences of sigma(x, y) and of the normal."""
     patch, h = PATCHES[5], 1e-5
 
     def sigma(x, y):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mesh of a patch: as fine as asked, no slivers, symmetric, and of few triangles where it is flat."""
+"""The mesh of a patch: as fine as requested, no slivers, symmetric, and of few triangles where it is flat."""
 
 from functools import cache
 
@@ -85,7 +85,7 @@ def rim_of(points, triangles):
 @pytest.mark.parametrize("tolerance", [1e-3, 5e-3])
 @pytest.mark.parametrize("domain", DOMAINS.values(), ids=DOMAINS)
 @pytest.mark.parametrize("patch", PATCHES.values(), ids=PATCHES)
-def test_a_mesh_is_as_near_as_asked_and_has_no_slivers(patch, domain, tolerance):
+def test_a_mesh_is_as_near_as_requested_and_has_no_slivers(patch, domain, tolerance):
     points, triangles = patch_mesh(patch, domain, tolerance)
     assert_allclose(points[:, 2], patch.height(*points[:, :2].T), 1e-6, 1e-12)
     assert deviations(patch, points, triangles).max() <= tolerance

@@ -77,7 +77,7 @@ def test_deviations_hold_for_noisy_centers(side):
     assert np.mean(within) >= 0.8
 
 
-def test_strokes_of_centers_alone_and_many_at_once():
+def test_strokes_of_centers_without_contours_and_many_at_once():
     centers, contours = felt(1, -1)
     rng, truth = np.random.default_rng(0), ring(1, -1)
     turn, around = rng.uniform(-0.2, 0.2, 400), np.pi + rng.uniform(-0.3, 0.3, 400)

@@ -129,8 +129,8 @@ def examine(r):
     x, y = np.vstack([r.domain.grid(100)[0], r.domain.boundary(12), points[:, :2]]).T
     patch = r.patch
     numbers = [
-        *(r.radius, r.noise, r.mean_height_std, r.blind, r.fit_error, r.total_absolute_curvature),
-        *(r.condition_number, patch.k1, patch.k2, r.domain.area),
+        *(r.radius, r.noise, r.mean_height_std, r.fit_error, r.total_absolute_curvature),
+        *(r.null_space_dimension, r.condition_number, patch.k1, patch.k2, r.domain.area),
     ]
     arrays = [
         *(r.frame.origin, r.frame.axes, r.contacts, r.domain.ends, patch.coefficients, numbers, x, y),
@@ -251,7 +251,7 @@ def circle(draw, touch):
 
 
 def reference(draw, touch):
-    """The reference point beside the curves."""
+    """The reference point off the curves."""
     touch["point"] = touch["point"] + 10.0 ** draw(st.integers(-12, 45)) * np.array([0.3, -1.0, 0.5])
 
 
@@ -353,7 +353,7 @@ def test_a_touch_with_one_thing_broken(touch):
 @given(touches())
 @in_time
 def test_many_touches_with_one_of_them_broken(touch):
-    """The broken one gives what it gives alone, and does the other no harm."""
+    """The broken one gives what `reconstruct` gives for it, and does the other no harm."""
     contours = refused(contours_of, touch)
     if contours is None:
         return
@@ -369,23 +369,23 @@ def test_many_touches_with_one_of_them_broken(touch):
         outward=[touch["outward"], outward],
         **options,
     )
-    alone = refused(reconstruct, touch["point"], contours, outward=touch["outward"], **options)
+    single = refused(reconstruct, touch["point"], contours, outward=touch["outward"], **options)
     if many is None:
-        assert alone is None
+        assert single is None
         return
     found, other = many
     examine(other)
-    if alone is None:
+    if single is None:
         assert isinstance(found, DegenerateCurvesError)
         assert is_sentence(found), found
         return
     examine(found)
     # Where a fit is in doubt, rounding may decide between two surfaces.
-    if alone.status == "ok" == found.status and alone.method == "bayes":
-        x, y = alone.domain.grid(60)[0].T
-        turn = found.frame.axes.T @ alone.frame.axes
-        u, v, w = turn @ [x, y, alone.patch.height(x, y)]
-        assert found.patch.height(u, v) == pytest.approx(w, abs=1e-4 * alone.radius)
+    if single.status == "ok" == found.status and single.method == "bayes":
+        x, y = single.domain.grid(60)[0].T
+        turn = found.frame.axes.T @ single.frame.axes
+        u, v, w = turn @ [x, y, single.patch.height(x, y)]
+        assert found.patch.height(u, v) == pytest.approx(w, abs=1e-4 * single.radius)
 
 
 @given(st.lists(ODD_POINTS, max_size=5), ODD_VECTORS, ODD_VECTORS, st.sampled_from(METHODS))

@@ -20,12 +20,10 @@ def touched(count, curves, strokes, seed):
         t = np.sort(rng.uniform(-rng.uniform(0.7, 1.0), 1.0, int(count * rng.uniform(0.7, 1.0))))
         felt.append(np.column_stack([t * np.cos(azimuth), t * np.sin(azimuth)]))
     x = np.linspace(-0.9, 0.9, strokes)
-    beside = (
-        [np.column_stack([x, np.full(strokes, y)]) for y in np.linspace(-0.9, 0.9, 12)] if strokes else []
-    )
+    rows = [np.column_stack([x, np.full(strokes, y)]) for y in np.linspace(-0.9, 0.9, 12)] if strokes else []
     return [
         [np.column_stack([p, height(*p.T)]) + rng.normal(0.0, noise, (len(p), 3)) for p in some]
-        for some in (felt, beside)
+        for some in (felt, rows)
     ]
 
 
@@ -47,24 +45,24 @@ def require_same(one, other, most=TO_ROUNDING):
 @pytest.mark.parametrize(("count", "curves"), [(20, 3), (60, 4), (101, 3), (150, 6), (1000, 3)])
 @pytest.mark.parametrize("strokes", [0, 8, 40])
 def test_a_fit_is_the_same_in_any_order(count, curves, strokes, seed):
-    felt, beside = touched(count, curves, strokes, seed)
-    rng, one = np.random.default_rng(seed), fitted(felt, beside)
-    require_same(one, fitted([points[::-1] for points in felt], beside))
-    require_same(one, fitted([felt[0][::-1], *felt[1:]], beside))
-    require_same(one, fitted([*felt[1:], felt[0]], beside))
-    require_same(one, fitted(map(rng.permutation, felt), beside))
+    felt, rows = touched(count, curves, strokes, seed)
+    rng, one = np.random.default_rng(seed), fitted(felt, rows)
+    require_same(one, fitted([points[::-1] for points in felt], rows))
+    require_same(one, fitted([felt[0][::-1], *felt[1:]], rows))
+    require_same(one, fitted([*felt[1:], felt[0]], rows))
+    require_same(one, fitted(map(rng.permutation, felt), rows))
     if strokes:
-        require_same(one, fitted(felt, [points[::-1] for points in beside]))
-        require_same(one, fitted(felt, [beside[i] for i in rng.permutation(12)]))
+        require_same(one, fitted(felt, [points[::-1] for points in rows]))
+        require_same(one, fitted(felt, [rows[i] for i in rng.permutation(12)]))
 
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("strokes", [8, 40])
-def test_strokes_alone_are_the_same_in_any_order(strokes, seed):
-    _, beside = touched(20, 3, strokes, seed)
-    one = fitted([], beside)
-    require_same(one, fitted([], [points[::-1] for points in beside]))
-    require_same(one, fitted([], [beside[i] for i in np.random.default_rng(seed).permutation(12)]))
+def test_strokes_without_contours_are_the_same_in_any_order(strokes, seed):
+    _, rows = touched(20, 3, strokes, seed)
+    one = fitted([], rows)
+    require_same(one, fitted([], [points[::-1] for points in rows]))
+    require_same(one, fitted([], [rows[i] for i in np.random.default_rng(seed).permutation(12)]))
 
 
 @pytest.mark.parametrize("count", [81, 301])
@@ -88,9 +86,9 @@ def test_measured_normals_and_ends_belong_to_their_contacts_in_any_order(count):
 
 
 def flat_at_the_point(kind, seed):
-    """Curves of a surface that is flat at the point, so that there the contacts tell no directions."""
+    """Curves of a surface that is flat at the point, so that contacts there determine no directions."""
     rng = np.random.default_rng(seed)
-    crease, curves, beside = rng.uniform(0.0, 7.0), rng.integers(3, 7), np.linspace(-1.0, 1.0, 30)
+    crease, curves, t = rng.uniform(0.0, 7.0), rng.integers(3, 7), np.linspace(-1.0, 1.0, 30)
 
     def at(t, azimuth, off=0.0):
         x, y = t * np.cos(azimuth) - off * np.sin(azimuth), t * np.sin(azimuth) + off * np.cos(azimuth)
@@ -100,14 +98,14 @@ def flat_at_the_point(kind, seed):
 
     azimuths = np.pi / curves * np.arange(curves) + rng.uniform(0.0, 7.0)
     felt = [at(np.sort(rng.uniform(-1.0, rng.uniform(0.7, 1.0), rng.integers(60, 200))), a) for a in azimuths]
-    return felt, [at(beside, rng.uniform(0.0, 7.0), off) for off in np.linspace(-0.9, 0.9, 4)]
+    return felt, [at(t, rng.uniform(0.0, 7.0), off) for off in np.linspace(-0.9, 0.9, 4)]
 
 
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("kind", ["fold", "monkey", "plane"])
 def test_where_there_are_no_directions_any_curve_may_be_the_first(kind, seed):
-    felt, beside = flat_at_the_point(kind, seed)
-    for strokes in ([], beside):
+    felt, rows = flat_at_the_point(kind, seed)
+    for strokes in ([], rows):
         one = fitted(felt, strokes)
         require_same(one, fitted(felt[1:] + felt[:1], strokes), TO_TILT)
         require_same(one, fitted(felt[::-1], strokes), TO_TILT)
@@ -116,8 +114,8 @@ def test_where_there_are_no_directions_any_curve_may_be_the_first(kind, seed):
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("curves", [0, 4])
 def test_where_a_sensor_rests_in_a_stroke_contacts_count_once(curves, seed):
-    felt, beside = touched(60, 4, 40, seed)
-    one, rng = fitted(felt[:curves], beside), np.random.default_rng(seed)
-    require_same(one, fitted(felt[:curves], [np.repeat(points, 2, axis=0) for points in beside]))
-    some = [np.repeat(points, rng.integers(1, 4, len(points)), axis=0) for points in beside]
+    felt, rows = touched(60, 4, 40, seed)
+    one, rng = fitted(felt[:curves], rows), np.random.default_rng(seed)
+    require_same(one, fitted(felt[:curves], [np.repeat(points, 2, axis=0) for points in rows]))
+    some = [np.repeat(points, rng.integers(1, 4, len(points)), axis=0) for points in rows]
     require_same(one, fitted(felt[:curves], some))

@@ -79,7 +79,7 @@ def test_a_quartic_along_its_own_curves_is_seen_by_least_squares_in_the_true_fra
     assert three.status == "uncertain"
 
 
-def test_degree_2_is_the_quadric_alone():
+def test_degree_2_is_only_the_quadric():
     s = surfaces.ellipsoid(35, 25, 20, 0.6, 0.5)
     contours = s.track(UPRIGHT, extent=5, step=0.5)
     results = [s.fit(contours, method=m, degree=2) for m in METHODS]
@@ -264,7 +264,7 @@ def test_a_sensor_that_knows_nothing_leaves_a_patch_in_doubt():
     assert np.isfinite([r.mean_height_std, r.patch.k1, r.patch.k2]).all()
 
 
-def test_a_weight_beyond_all_measure_leaves_the_contacts_alone():
+def test_with_a_weight_beyond_all_measure_only_the_contacts_count():
     ball = surfaces.sphere(25)
     errors = [
         ball.fit(GOOD, method="tagc", degree=6, weight=weight).fit_error for weight in (1e12, 1e20, 1e50)
@@ -411,7 +411,7 @@ def test_importing_core_imports_neither_blender_nor_scipy():
     assert subprocess.run([sys.executable, "-c", code], cwd=root).returncode == 0
 
 
-def test_short_curves_beside_a_long_one_cost_the_fit_what_they_have(monkeypatch):
+def test_short_curves_with_a_long_one_cost_the_fit_what_they_have(monkeypatch):
     module = importlib.import_module("core.reconstruction.stacks")
     seen, fit = [], module.joint_fit
     monkeypatch.setattr(module, "joint_fit", lambda c, *rest: seen.append(c.contacts.shape) or fit(c, *rest))

@@ -42,9 +42,9 @@ def test_through_json_and_back_it_is_the_same_to_the_last_bit(r):
     for one, other in zip(again.contours, r.contours, strict=True):
         for key, value in vars(one).items():
             assert np.array_equal(value, vars(other)[key]), key
-    for name in ("method", "status", "message", "blind", "radius", "converged", "mean_height_std"):
+    for name in ("method", "status", "message", "radius", "converged", "mean_height_std"):
         assert getattr(again, name) == getattr(r, name)
-    for name in ("fit_error", "total_absolute_curvature", "condition_number"):
+    for name in ("null_space_dimension", "fit_error", "total_absolute_curvature", "condition_number"):
         assert getattr(again, name) == getattr(r, name)
     assert suggest_plane(again) == suggest_plane(r)
 
@@ -87,8 +87,8 @@ VALUES = [None, "ball", float("nan"), [], {}, [[1.0]], [{}], -1]
 
 
 def is_refused(key, value):
-    """`converged` takes any value as true or false, and `taps` may be missing."""
-    return value is None if key == "converged" else value is not None or key != "taps"
+    """Only `taps` may be missing."""
+    return value is not None or key != "taps"
 
 
 @pytest.mark.parametrize(("key", "value"), [c for c in product(KEYS, VALUES) if is_refused(*c)], ids=str)
@@ -104,6 +104,7 @@ def test_a_damaged_dict_is_refused_with_a_sentence(key, value):
         (["geometry", "radius"], None, "radius: expected it in the dict of a reconstruction, got none"),
         (["geometry", "radius"], 1e-300, "radius: expected a finite number of 1e-50 or more"),
         (["method"], "magic", "method: expected one of bayes"),
+        (["converged"], "false", "converged: expected True or False, as to_dict gives it, got 'false'"),
         (["geometry", "frame", "axes"], np.diag([1, 1, -1]).tolist(), "axes: expected a right-handed frame"),
         (["geometry", "frame", "axes"], np.diag([2, 2, 2]).tolist(), "axes: expected a right-handed frame"),
         (["geometry", "frame", "origin"], [0, 0], "origin: expected shape"),

@@ -101,7 +101,7 @@ def test_a_curve_that_misses_the_point_is_named_with_its_distance():
     assert "set the point where the curves meet" in r.message
 
 
-def test_curves_that_bend_at_a_point_of_their_own_are_not_told_to_meet_elsewhere():
+def test_curves_that_bend_at_a_point_of_their_own_get_no_advice_to_meet_elsewhere():
     """The point is one of their contacts, as that of a touch is: at the tip of a cone the fit is off it."""
     s = np.linspace(-1.0, 1.0, 25)
     curves = [np.outer(s, [np.cos(a), np.sin(a), 0.0]) - np.outer(np.abs(s), [0, 0, 0.2]) for a in (0, 1, 2)]
@@ -114,7 +114,7 @@ def test_curves_that_bend_at_a_point_of_their_own_are_not_told_to_meet_elsewhere
 
 @pytest.mark.parametrize("share", [0.1, 0.3, 3.0])
 @pytest.mark.parametrize("way", ["normal", "across"])
-def test_a_point_beside_the_curves_is_told_before_anything_that_follows_from_it(share, way):
+def test_a_point_off_the_curves_is_reported_before_anything_that_follows_from_it(share, way):
     s = surfaces.pear()
     contours = contours_of(s, noise=0.02)
     off = share * np.ptp(contours[0].points, axis=0).max()
@@ -132,7 +132,7 @@ def test_a_point_beside_the_curves_is_told_before_anything_that_follows_from_it(
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_curves_that_carry_no_frame_from_a_point_beside_them_are_not_blamed(seed):
+def test_curves_that_carry_no_frame_from_a_point_off_them_are_not_blamed(seed):
     s, rng = surfaces.pear(), np.random.default_rng(seed)
     contours = contours_of(s, noise=0.02)
     size, off = np.ptp(contours[0].points, axis=0).max(), rng.normal(size=3)
@@ -172,21 +172,21 @@ def test_principal_directions_that_may_be_far_off():
     assert len(turned) > 10
 
 
-def test_the_frame_is_hardly_ever_off_by_more_than_the_angle_that_is_told():
+def test_the_frame_is_hardly_ever_off_by_more_than_the_stated_angle():
     s = surfaces.pear()
     exact = s.fit(contours_of(s, noise=0.0)).frame.axes
-    angles, told = [], []
+    angles, bounds = [], []
     for seed in range(60):
         r = s.fit(contours_of(s, noise=0.1, seed=seed))
         angles.append(np.arccos(min(1.0, abs(exact[:, 0] @ r.frame.axes[:, 0]))))
-        told.append(r.posterior.turn())
-    assert np.mean(np.array(angles) <= told) > 0.9
-    assert np.mean(told) < 4.0 * np.sqrt(np.mean(np.square(angles)))
+        bounds.append(r.posterior.turn())
+    assert np.mean(np.array(angles) <= bounds) > 0.9
+    assert np.mean(bounds) < 4.0 * np.sqrt(np.mean(np.square(angles)))
 
 
 @pytest.mark.parametrize("surface", [surfaces.pear(), surfaces.ellipsoid(30, 28, 27, 0.4, 0.5)])
 @pytest.mark.parametrize("degrees", [(13, 73, 133), (13, 33, 53)])
-def test_the_angle_told_is_a_quantile_of_the_posterior(surface, degrees):
+def test_the_stated_angle_is_a_quantile_of_the_posterior(surface, degrees):
     r = surface.fit(contours_of(surface, degrees=degrees, noise=0.15))
     mean, covariance = r.posterior.mean[:5], r.posterior.covariance[:5, :5]
     drawn = np.random.default_rng(0).multivariate_normal(mean, covariance, 40_000)
@@ -327,12 +327,12 @@ def test_the_frame_may_be_ten_degrees_off_and_curvatures_a_tenth_of_one_over_the
 
 
 @pytest.mark.parametrize(
-    ("deviations", "angle", "told"), [(5.5, 0.011, True), (5.5, 0.009, False), (4.5, 0.011, False)]
+    ("deviations", "angle", "uncertain"), [(5.5, 0.011, True), (5.5, 0.009, False), (4.5, 0.011, False)]
 )
-def test_normals_contradict_by_five_deviations_and_a_hundredth(deviations, angle, told):
+def test_normals_contradict_by_five_deviations_and_a_hundredth(deviations, angle, uncertain):
     r = surfaces.pear().fit(contours_of(surfaces.pear()))
     vars(r)["contradiction"] = (deviations, angle)
-    assert (r.status == "uncertain") is told
+    assert (r.status == "uncertain") is uncertain
 
 
 def waves(length, height, azimuth, k2=-0.01):
@@ -376,8 +376,8 @@ def test_low_waves_and_waves_that_strokes_show_are_none_to_doubt():
             contours = surface.track(surfaces.planes((0, 60, 120)), extent=13, step=13 / 24)
             x, y = rng.uniform(-9.0, 9.0, (2, strokes))
             flat = np.column_stack([x, y, np.full(strokes, 13.0)])
-            beside = [surface.crossings(flat, np.array([0.0, 0.0, -1.0]), 26.0)] if strokes else []
-            assert "Waves" not in surface.fit(contours, strokes=beside).message
+            scattered = [surface.crossings(flat, np.array([0.0, 0.0, -1.0]), 26.0)] if strokes else []
+            assert "Waves" not in surface.fit(contours, strokes=scattered).message
 
 
 def test_outlying_contacts_are_no_waves():

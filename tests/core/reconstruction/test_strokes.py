@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strokes, contacts beside the reference point: with contours and alone, dense, noisy and too few."""
+"""Strokes, curves off the reference point: with and without contours, dense, noisy and too few."""
 
 import json
 from functools import cache
@@ -55,16 +55,16 @@ def judged(surface, r):
     return off.mean(), (off < 1.645 * r.height_std(*points.T)).mean()
 
 
-def alone(name, points, shift=(0.0, 0.0, 0.0), **options):
+def fitted(name, points, shift=(0.0, 0.0, 0.0), **options):
     surface = SURFACES[name]
     return reconstruct(surface.point + shift, [], outward=surface.normal, strokes=[points], **options)
 
 
 @pytest.mark.parametrize("name", SURFACES)
 @pytest.mark.parametrize("rows", [0, 9])
-def test_strokes_alone_show_an_exact_surface(name, rows):
+def test_strokes_without_contours_show_an_exact_surface(name, rows):
     surface = SURFACES[name]
-    r = alone(name, wiped(name, 600, rows))
+    r = fitted(name, wiped(name, 600, rows))
     assert r.status == "ok"
     assert judged(surface, r)[0] < 3e-4 * EXTENT
     scale = max(abs(surface.k1), abs(surface.k2))
@@ -78,17 +78,17 @@ def test_strokes_alone_show_an_exact_surface(name, rows):
 
 @pytest.mark.parametrize("name", SURFACES)
 def test_the_error_falls_as_the_square_of_the_extent_to_what_no_polynomial_tells(name):
-    errors = [judged(SURFACES[name], alone(name, wiped(name, 500, 0, extent)))[0] for extent in (16.0, 4.0)]
+    errors = [judged(SURFACES[name], fitted(name, wiped(name, 500, 0, extent)))[0] for extent in (16.0, 4.0)]
     assert errors[1] < max(errors[0] / 4.0**2, 1e-4 * 4.0)
 
 
 @pytest.mark.parametrize("rows", [0, 9])
 @pytest.mark.parametrize(("count", "share"), [(150, 0.002), (150, 0.02), (3000, 0.002), (3000, 0.02)])
-def test_intervals_of_strokes_alone_hold_and_rows_do_not_bias(count, rows, share):
+def test_intervals_of_strokes_hold_and_rows_do_not_bias(count, rows, share):
     within, steepness = [], []
     for name, surface in SURFACES.items():
         for seed in range(4):
-            r = alone(name, noisy(wiped(name, count, rows), share * EXTENT, seed))
+            r = fitted(name, noisy(wiped(name, count, rows), share * EXTENT, seed))
             within.append(judged(surface, r)[1])
             mean, true = 0.5 * (r.patch.k1 + r.patch.k2), 0.5 * (surface.k1 + surface.k2)
             steepness.append((mean - true) / r.mean_curvature_std)
@@ -103,13 +103,13 @@ def test_dense_strokes_are_better_than_some_of_them(share):
     for name, surface in SURFACES.items():
         for seed in range(2):
             points = noisy(wiped(name, 3000, 9), share * EXTENT, seed)
-            dense.append(judged(surface, alone(name, points))[0])
-            some.append(judged(surface, alone(name, points[::16]))[0])
+            dense.append(judged(surface, fitted(name, points))[0])
+            some.append(judged(surface, fitted(name, points[::16]))[0])
     assert np.mean(dense) < (0.6 if share == 0.02 else 1.05) * np.mean(some)
 
 
 @pytest.mark.parametrize("count", [300, 3000])
-def test_beside_contours_strokes_bring_the_patch_nearer(count):
+def test_with_contours_strokes_bring_the_patch_nearer(count):
     with_strokes, without, within = [], [], []
     for name, surface in SURFACES.items():
         for seed in range(3):
@@ -126,7 +126,7 @@ def test_beside_contours_strokes_bring_the_patch_nearer(count):
     assert np.mean(within) >= 0.8
 
 
-def test_beside_contours_the_point_l_and_domain_are_theirs_and_far_strokes_are_ignored():
+def test_with_contours_the_point_l_and_domain_are_theirs_and_far_strokes_are_ignored():
     surface, contours = SURFACES["pear"], crossed("pear")
     far = wiped("pear", 400, 0, 30.0)
     far = far[np.linalg.norm(far - surface.point, axis=1) > 15.0]
@@ -140,12 +140,12 @@ def test_beside_contours_the_point_l_and_domain_are_theirs_and_far_strokes_are_i
     assert r.domain.boundary(40) == pytest.approx(plain.domain.boundary(40), abs=0.02 * EXTENT)
     assert len(r.contacts) == len(plain.contacts) + len(r.strokes)
     # Three planes leave directions open that strokes show.
-    assert plain.blind > 0 == r.blind
+    assert plain.null_space_dimension > 0 == r.null_space_dimension
 
 
 def test_the_origin_is_the_foot_of_the_place():
     surface, points = SURFACES["torus"], wiped("torus", 600)
-    r = alone("torus", points)
+    r = fitted("torus", points)
     for shift in ((0.0, 0.0, 0.0), (0.7, -0.4, 0.9)):
         place = surface.point + shift
         r = reconstruct(place, [], outward=surface.normal, strokes=[points])
@@ -158,7 +158,7 @@ def test_the_origin_is_the_foot_of_the_place():
 def test_the_height_at_the_origin_is_as_uncertain_as_the_contacts_leave_it():
     surface, heights, stds = SURFACES["sphere"], [], []
     for seed in range(60):
-        r = alone("sphere", noisy(wiped("sphere", 100), 0.2, seed), noise=0.2)
+        r = fitted("sphere", noisy(wiped("sphere", 100), 0.2, seed), noise=0.2)
         foot = r.frame.to_local([surface.point * 25.0 / np.linalg.norm(surface.point)])[0]
         heights.append(foot[2] - r.height(*foot[:2]))
         stds.append(r.height_std(0.0, 0.0))
@@ -167,7 +167,7 @@ def test_the_height_at_the_origin_is_as_uncertain_as_the_contacts_leave_it():
 
 
 def test_all_that_tells_of_the_deviation_agrees():
-    r = alone("sphere", noisy(wiped("sphere", 100), 0.2, 0), noise=0.2)
+    r = fitted("sphere", noisy(wiped("sphere", 100), 0.2, 0), noise=0.2)
     assert r.posterior.amplitude == 0.0
     assert mean_height_stds([r, r]) == pytest.approx([r.mean_height_std] * 2)
     flat = r.domain.grid(60)[0] / r.radius
@@ -175,13 +175,13 @@ def test_all_that_tells_of_the_deviation_agrees():
     assert np.sqrt(variances) == pytest.approx(r.height_std(*(r.radius * flat).T) / r.radius)
 
 
-def test_the_radius_limits_the_contacts_of_strokes_alone():
+def test_without_contours_the_radius_limits_the_contacts_of_strokes():
     points = np.vstack([wiped("saddle", 600, 9), SURFACES["saddle"].point + np.array([300.0, 0.0, 50.0])])
-    r = alone("saddle", points, radius=6.0)
+    r = fitted("saddle", points, radius=6.0)
     assert 5.0 < r.radius <= 6.0
     assert np.linalg.norm(r.strokes - SURFACES["saddle"].point, axis=1).max() <= 6.0
     with pytest.raises(ValueError, match="radius: expected a finite number above 0"):
-        alone("saddle", points, radius=0.0)
+        fitted("saddle", points, radius=0.0)
     with pytest.raises(
         ValueError, match="radius: expected none with contours, which say how far the patch reaches"
     ):
@@ -305,7 +305,7 @@ def test_through_json_and_back_it_is_the_same_to_the_last_bit(with_contours):
 
 def test_a_stroke_may_be_a_contour_and_brings_its_noise():
     points = noisy(wiped("pear", 120), 0.2, 0)
-    one = alone("pear", points, noise=0.2)
+    one = fitted("pear", points, noise=0.2)
     r = reconstruct(
         SURFACES["pear"].point,
         [],
@@ -317,7 +317,7 @@ def test_a_stroke_may_be_a_contour_and_brings_its_noise():
 
 
 def test_a_mean_takes_in_several_rows():
-    """All contacts of a row may share an offset, which the mean of one row alone would keep."""
+    """All contacts of a row may share an offset, which the mean of a single row would keep."""
     rng = np.random.default_rng(0)
     for rows, most in ((12, LEAST_STRIPS), (100, STRIPS)):
         x, y = np.meshgrid(np.linspace(-1.0, 1.0, 100), np.linspace(-1.0, 1.0, rows))
@@ -332,7 +332,7 @@ def test_where_a_sensor_dwells_it_tells_no_more_of_the_shape(name):
     dwelling = np.vstack(
         [points[:1234], noisy(np.repeat(points[1234:1235], 2000, axis=0), 1e-3, 0), points[1234:]]
     )
-    plain, dwelled = alone(name, points), alone(name, dwelling)
+    plain, dwelled = fitted(name, points), fitted(name, dwelling)
     assert dwelled.radius == pytest.approx(plain.radius, rel=0.005)
     kappas = [dwelled.patch.k1, dwelled.patch.k2]
     assert kappas == pytest.approx([plain.patch.k1, plain.patch.k2], abs=1e-3 / plain.radius)
@@ -341,7 +341,7 @@ def test_where_a_sensor_dwells_it_tells_no_more_of_the_shape(name):
 @pytest.mark.parametrize("name", SURFACES)
 def test_a_stray_contact_far_off_changes_nothing(name):
     points = wiped(name, 500)
-    plain, other = alone(name, points), alone(name, np.vstack([points, [[300.0, 200.0, 50.0]]]))
+    plain, other = fitted(name, points), fitted(name, np.vstack([points, [[300.0, 200.0, 50.0]]]))
     assert other.radius == plain.radius
     assert np.array_equal(other.contacts, plain.contacts)
 

@@ -45,7 +45,7 @@ class Prism:
 
 
 def arc(facets, bend=60.0):
-    """An arc of radius 1 that bends by so many degrees to either side, in facets."""
+    """An arc of radius 1 that bends by `bend` degrees to either side, in facets."""
     angles = np.radians(np.linspace(-bend, bend, facets + 1))
     return Prism(np.column_stack([np.sin(angles), np.cos(angles)]))
 
@@ -139,7 +139,7 @@ def test_a_flat_face_between_sharp_edges_is_the_shape():
     assert not has_few(Prism([(-1.0, 0.0), (-0.3, 0.0), (0.2, 0.0), (1.0, 0.0)]), 0.5)
 
 
-def test_a_flat_face_beside_a_fillet_is_the_shape():
+def test_a_flat_face_next_to_a_fillet_is_the_shape():
     round_ = [
         (1.0 + 0.05 * math.sin(a), -0.05 + 0.05 * math.cos(a)) for a in np.radians(np.arange(0, 100, 18))
     ]

@@ -31,7 +31,7 @@ def test_of_the_points_in_a_cell_one_is_left():
 
 
 def test_scattered_points_are_even_by_area_and_on_their_faces():
-    # A square of two triangles, nine times as large as the third, which stands upright beside it.
+    # A square of two triangles, nine times as large as the third, which stands upright next to it.
     points = np.array(
         [[0, 0, 0], [3, 0, 0], [3, 3, 0], [0, 3, 0], [5, 0, 0], [5, 2, 0], [5, 0, 1]], dtype=float
     )

@@ -205,7 +205,7 @@ def test_another_layer_than_the_nearest_does_not_count():
     roofed = Cut(surface, r.frame.origin, direction, roof=0.3 * r.radius)
     on_roof = (vertices - r.frame.origin) @ direction < 0.0
     assert len(seen(r, roofed, vertices[on_roof] + 0.3 * r.radius * up, normals[on_roof])) == 0
-    lifted = shifted(r, 0.3 * r.radius)  # a patch on the roof, beside which the plane is the nearest layer
+    lifted = shifted(r, 0.3 * r.radius)  # a patch on the roof; off it, the plane is the nearest layer
     assert len(seen(lifted, roofed, vertices[on_roof] + 0.3 * r.radius * up, normals[on_roof])) > 50
     assert len(seen(lifted, roofed, vertices[~on_roof], normals[~on_roof])) > 50
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Jia and Tian's way: three upright planes, degree 4, (9) with 9.99/mm^2 at L = 10 mm, and their descent.
 
-They do not tell their extents, so these are left to the surface.
+The paper does not state its extents, so these are automatic.
 """
 
 from math import radians
