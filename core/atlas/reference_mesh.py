@@ -23,6 +23,7 @@ from .tetrahedra import Indices
 NEAREST = 3  # The nearest triangle is looked for at this many of the nearest vertices.
 SAME = 1e-6  # Triangles that are nearer by a smaller share of the distance are as near.
 AHEAD = 0.95  # The normal at a foot gives the sign if the cosine of its angle to the way there is more.
+SAGITTA = 0.25  # The surface is within this share of an edge of a place on the mesh.
 FAR = 2.0  # Places that are farther away than this many cells have the sign of the indicator.
 PREPARED = ("tree", "fans", "edge", "normals", "is_open", "angles")  # Each is found once for a mesh.
 # python -m benchmarks.measured judges these: where the surface goes on unfelt,
@@ -206,8 +207,8 @@ class ReferenceMesh:
 
     def _project(self, charts: Charts, places: Array, up: Array) -> tuple[SurfaceSample, Array]:
         """The surface near places (n, 3) that faces `up` (n, 3), and the places moved onto it."""
-        for _ in range(2):  # Farther away than an edge there is only another part of the surface.
-            surface = surface_within_margin(charts, self.indicator, places, up, self.edge)
+        for _ in range(2):  # What is farther from a place of the mesh is another part of the surface.
+            surface = surface_within_margin(charts, self.indicator, places, up, SAGITTA * self.edge)
             places = places - surface.distance[:, None] * surface.normal
         return surface, places
 

@@ -23,7 +23,7 @@ DENSER = 0.5  # Where walls need cells finer than this share, samples are taken 
 FINEST, COARSEST = 1.0 / 400.0, 1.0 / 80.0  # Cells are between these shares of the size.
 TOLERANCES = 5.0  # A cell is at most this many tolerances.
 OPPOSITE = -0.9  # Two patches are the sides of a wall or gap if the cosine between their normals is less.
-THIN_SHARE = 0.01  # Walls are at least as thick as all but this share of the area is.
+THIN_SHARE = 0.003  # Walls are at least as thick as all but this share of the area is.
 CERTAIN = 5.0  # Two sides that are nearer than this many deviations are no wall or gap.
 PATCHES_AT_ONCE, SAMPLES_AT_ONCE = 20, 3000  # A step takes this many patches, or this many samples.
 
