@@ -52,18 +52,18 @@ from .atlas_shapes import (
 
 NOISE = 0.0005
 PLACES = 1000  # This many places are judged around each scan, and as many above felt area.
-ABOVE = 0.1  # These are at most so far above it.
+ABOVE = 0.1  # The largest height of these above it.
 SURE = 5.0
-CLOSE, COARSE = 0.95, 1.8  # Strokes are so many half walls apart.
+CLOSE, COARSE = 0.95, 1.8  # The distance between strokes, in halves of a wall.
 # benchmarks.atlas touches it, too, where its thinnest walls are not resolved.
 WALLS = {"cad_block": 0.0064}
-RIGHT, FEWEST, MOST = 0.99, 100, 200_000  # Of so many contacts, fewer right normals ask for a doubt.
+RIGHT, FEWEST, MOST = 0.99, 100, 200_000  # With fewer right normals, of this many contacts, a doubt is due.
 TOLERANCE, EXTENT = (
     0.3,
     6.0,
 )  # Of the pebble of examples/robot.py, in mm, and the length of a half curve there.
-GAP = 0.01  # Two balls are ten times as far from each other.
-GAPS = (0.03, 0.06)  # The strokes of a scan are so far apart, at least and at most.
+GAP = 0.01  # A tenth of the distance between two balls.
+GAPS = (0.03, 0.06)  # The least and the largest distance between the strokes of a scan.
 FINE = 0.5  # Contacts along a stroke are this share of the gap apart.
 OBJECTS = {
     "ball": lambda: revolved(arc(1.0, 0.0, 0.0, np.pi)),
@@ -319,7 +319,7 @@ def example():
 
 
 def print_touches(count):
-    """The time of an atlas of so many touches of the pebble, of three curves each."""
+    """The time of an atlas of `count` touches of the pebble, of three curves each."""
     robot, k = example(), np.arange(count) + 0.5
     across, turn = np.arccos(1.0 - 2.0 * k / count), np.pi * (1.0 + np.sqrt(5.0)) * k
     ways = np.stack([np.cos(turn) * np.sin(across), np.sin(turn) * np.sin(across), np.cos(across)], axis=1)
@@ -340,7 +340,7 @@ def print_touches(count):
 
 
 def print_robot(count):
-    """The touches of examples/robot.py with so many seeds, and those of `explore_object` on its pebble."""
+    """The touches of examples/robot.py with `count` seeds, and those of `explore_object` on its pebble."""
     robot, rows = example(), []
     for seed in range(count):
         path = Path(tempfile.mkdtemp()) / "contacts.csv"

@@ -145,7 +145,7 @@ class ReferenceMesh:
         off = points - feet
         ahead = np.einsum("ni,ni->n", off, surface.normal)
         away = np.linalg.norm(off, axis=1)
-        # A triangle is a chord: the foot of its plane is a little beside that of the surface.
+        # A triangle is a chord: the foot of its plane is a little off that of the surface.
         across = off - ahead[:, None] * surface.normal
         some = np.flatnonzero((np.abs(ahead) > AHEAD * away) & (np.linalg.norm(across, axis=1) < self.edge))
         there, tried = self._project(charts, feet[some] + across[some], up[some])
@@ -180,20 +180,20 @@ class ReferenceMesh:
         away, side : (n,), distances and their signs; ahead : (n,), the part along the normals at the feet
         rim : (n,), distances from the border; behind : (n,), the indicator; ends : (n,), feet on the border
 
-        What goes on beyond the border may come nearer than the foot, as far as the place is farther away than
-        the foot is from the border. Behind the surface the inside is known as far as other parts close it,
+        What goes on beyond the border may come nearer than the foot, by as much as the place is farther away
+        than the foot is from the border. Behind the surface the inside is known where other parts close it,
         and above it the outside where these do not contradict it.
         """
-        beside = np.sqrt(np.maximum(rim**2 - away**2, 0.0))
+        to_border = np.sqrt(np.maximum(rim**2 - away**2, 0.0))
         across = np.sqrt(np.maximum(away**2 - ahead**2, 0.0))
         shallow, above = (
             SHALLOW * self.indicator.cell,
-            np.maximum(REACHES * beside, ABOVE * self.indicator.size),
+            np.maximum(REACHES * to_border, ABOVE * self.indicator.size),
         )
         inside = (away < shallow) | ((behind > CLOSED) & ~ends)
         outside = (away < above) & ((behind < 0.0) | (away < shallow))
         known = np.where(side < 0.0, inside, outside) & (~ends | (across < BEYOND * self.mesh.edge))
-        nearer = 0.5 * (away * (1.0 - np.cos(TURNED)) - beside * np.sin(TURNED))
+        nearer = 0.5 * (away * (1.0 - np.cos(TURNED)) - to_border * np.sin(TURNED))
         growth = np.where(ends, np.maximum(across, away - shallow), nearer)
         distance = np.where(ends, ahead, np.copysign(away, side))
         return distance, np.where(known, np.hypot(std, np.maximum(growth, 0.0)), np.inf)

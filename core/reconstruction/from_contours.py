@@ -47,10 +47,11 @@ def reconstruct(
     point : (3,), exact; outward : (3,), on the outer side of the surface. If the contours are those of a
         ball's center, the patch is that of the contacts, and the point is a center or, if no center is
         nearer to it than half the ball's radius, a contact
-    strokes : contacts beside the point, (n, 3) each or Contours, in the order in which they were felt, either
-      way; their normals are not fitted. Only "bayes" fits them. With contours, those beyond the domain are
-      ignored. Without contours the point is only a place: the origin is its projection onto the polynomial,
-      L is the distance of the farthest contact, and the domain is the hull of the contacts
+    strokes : curves that do not pass through the point, (n, 3) each or Contours, in the order in which their
+      contacts were felt, either way; their normals are not fitted. Only "bayes" fits them. With contours,
+      contacts beyond the domain are ignored. Without contours the point is only a place: the origin is its
+      projection onto the polynomial, L is the distance of the farthest contact, and the domain is the hull of
+      the contacts
     radius : without contours, use contacts up to this distance from the point; None for all
     method : "bayes" (bayes/joint_fit.py), or one of the paper's: "tagc" (9), "quadratic-variation",
         "least-squares" (5)

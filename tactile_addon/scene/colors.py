@@ -14,7 +14,7 @@ COLOR_STOPS = np.array([
     (253, 219, 199), (244, 165, 130), (214, 96, 77), (178, 24, 43),
 ]) / 255.0  # fmt: skip
 
-SURE = 2.0  # What is within so many deviations of the mean has its color.
+SURE = 2.0  # What is within this many deviations of the mean has its color.
 LEAST_STD = 1e-6  # A deviation counts as at least this share of the largest one.
 UNKNOWN = (0.5, 0.5, 0.5, 1.0)  # The color of what has no value, in sRGB.
 

@@ -148,7 +148,7 @@ def test_touches_that_choose_their_extent_are_those_of_the_other_operator(empty,
 
 
 def test_an_automatic_extent_fits_the_place(empty, ridge):
-    """The extent is long beside a ridge and short on it, so fewer patches are in doubt."""
+    """The extent is long off a ridge and short on it, so fewer patches are in doubt."""
     painted, record = stability_map(empty, target=ridge.name, spacing=0.1)
     fixed, given = stability_map(empty, target=ridge.name, spacing=0.1, extent=0.5)
     assert (record["extent"], record["step"]) == (0.0, 0.0)
