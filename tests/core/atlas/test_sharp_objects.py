@@ -171,6 +171,19 @@ def test_signs_and_intervals_are_true_around_edges(name, request):
     assert np.mean(((off > 8.0 * std) & (off > 5e-3 * 2.0))[finite]) < 1e-3
 
 
+def test_places_on_the_mesh_do_not_jump_to_another_wall_near_by(block):
+    """The mesh is moved aside, as if it were the lower wall of a step whose upper one has a patch."""
+    reference = block.reference
+    moved = reference.mesh._replace(
+        vertices=reference.mesh.vertices + np.array([0.0, 0.0, 0.4 * reference.edge])
+    )
+    top = np.flatnonzero(np.abs(reference.mesh.vertices - [0.0, 0.0, HALF[2]]).max(axis=1) < 0.3)
+    distance, std = ReferenceMesh(moved, reference.indicator).distances(block.charts, moved.vertices[top])
+    assert len(top) > 20
+    assert np.abs(distance).max() < 1e-3 * reference.edge
+    assert np.isfinite(std).all()
+
+
 def test_far_away_and_outside_of_the_grid_the_side_is_right(block):
     far = np.random.default_rng(2).normal(size=(200, 3)) * 50.0
     distance, std = block.distance(far)
