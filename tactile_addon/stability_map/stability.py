@@ -25,6 +25,7 @@ SPACING_SHARE = 1.0 / 4.0  # The default spacing, as a share of the extent.
 BATCH = 20  # The number of touches that are fitted at once, in some hundredths of a second.
 GROWING_BATCH = 4  # Touches that choose their extent are fewer, because their fits have more contacts.
 NEAREST_AT_ONCE = 10_000  # The number of vertices that get their nearest touch at once.
+EQUAL = 1e-3  # Areas that differ by a smaller share are equal but for rounding.
 NOTHING = -1.0  # Each quantity has this value where there is no patch.
 # The values of the attribute `reason`: key, name, and the stop of a curve that it follows from.
 REASONS = [
@@ -59,7 +60,8 @@ class StabilityMap:
     places : n arrays (3,), the places to touch as the surface has them, in random order
     done : how many of these have been touched
     measures, reason : (n,), what was found by each touch; the fields of `measures` are MEASURES
-    nearest : index of the touch that is nearest to each vertex of the mesh, once the steps are done
+    nearest : index of the touch whose values each vertex of the mesh has, once the steps are done: that of
+        the largest touched face at it, or else the nearest
     """
 
     def __init__(
@@ -98,15 +100,17 @@ class StabilityMap:
         self._rng = np.random.default_rng(seed)
         _rehearse(planes, fit, **self._glance)
         self.places: list[Array] = []
+        self._touched: list[int] = []  # the faces of these
         self.done = 0
 
     def steps(self) -> Iterator[None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
-        middles = _middles(self.surface)
+        middles, self._areas = _faces(self.surface)
         yield
         for index in core.spaced(middles, self.spacing, self._rng):
             if index is not None:
                 self.places.append(middles[index])
+                self._touched.append(index)
             yield
         count = len(self.places)
         self.measures = np.full(count, NOTHING, dtype=[(name, float) for name in MEASURES])
@@ -120,7 +124,7 @@ class StabilityMap:
         yield from self.spread()
 
     def spread(self) -> Iterator[None]:
-        """Finds the nearest of the touches that are done for each vertex, as a generator like `steps`."""
+        """Finds the touch for each vertex among those that are done, as a generator like `steps`."""
         from scipy.spatial import cKDTree
 
         points = self.surface.points
@@ -131,6 +135,12 @@ class StabilityMap:
                 points[start : start + NEAREST_AT_ONCE]
             )[1]
             yield
+        # Touches in narrow faces would color wide ones that share all vertices with them, as on a plate.
+        touch = np.full(len(self._areas), -1)
+        touch[self._touched[: self.done]] = np.arange(self.done)
+        order = np.argsort(self._areas[self.surface.owners], kind="stable")
+        order = order[touch[self.surface.owners[order]] >= 0]
+        self.nearest[self.surface.triangles[order].ravel()] = np.repeat(touch[self.surface.owners[order]], 3)
 
     def _touch(self, numbers: Sequence[int]) -> Iterator[None]:
         """Makes the touches with these numbers, as a generator like `steps`."""
@@ -211,14 +221,18 @@ def _reason_of(stops: Iterable[str]) -> int:
     return STOP_CODES[counts.most_common(1)[0][0] if counts else core.CREASE]
 
 
-def _middles(surface: DetachedMesh) -> Array:
-    """The middle of the largest triangle of each face, (m, 3), which is within it even if it is concave."""
-    corners = surface.points[surface.triangles]
+def _faces(surface: DetachedMesh) -> tuple[Array, Array]:
+    """The middle of the largest triangle of each face, (m, 3), and the areas of faces, (m,).
+
+    The middle is within a face even if that is concave. Of equal triangles, as in a quad, it is the first.
+    """
+    corners, owners = surface.points[surface.triangles], surface.owners
     a, b, c = corners.swapaxes(0, 1)
-    order = np.lexsort((np.linalg.norm(np.cross(b - a, c - a), axis=1), surface.owners))
-    largest = order[np.diff(surface.owners[order], append=-1) != 0]
-    found: Array = corners[largest].mean(axis=1)
-    return found
+    areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    most = np.maximum.reduceat(areas, np.flatnonzero(np.diff(owners, prepend=-1)))
+    large = np.flatnonzero(areas >= (1.0 - EQUAL) * most[owners])
+    first = large[np.diff(owners[large], prepend=-1) != 0]
+    return corners[first].mean(axis=1), np.bincount(owners, areas)
 
 
 class _Plane:

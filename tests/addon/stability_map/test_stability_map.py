@@ -293,9 +293,9 @@ def test_the_copy_has_its_attributes_and_the_target_is_untouched(empty, ball):
 
 
 def test_lengths_are_those_of_the_world(empty, ball):
-    _, small = stability_map(empty, spacing=0.4, extent=0.5)
+    _, small = stability_map(empty, spacing=0.25, extent=0.5)
     ball.scale, ball.location, ball.rotation_euler = (10.0, 10.0, 10.0), (1e4, 0.0, 0.0), (1.0, 2.0, 3.0)
-    _, large = stability_map(empty, target="Sphere", spacing=4.0, extent=5.0)
+    _, large = stability_map(empty, target="Sphere", spacing=2.5, extent=5.0)
     assert large["points"] == pytest.approx(small["points"], rel=0.05)
     for name in ("error_median", "height_std_median"):
         assert large[name] == pytest.approx(10.0 * small[name], rel=0.05)
@@ -499,6 +499,15 @@ def test_a_probe_finds_the_place_that_a_map_touched(empty, vase, extension):
         assert (vase.matrix_world @ foot - place).length < 1e-5
         assert np.allclose(touched_near(painted, place + Vector((0.02, 0.0, 0.0))), place)
     assert touched_near(painted, (50.0, 0.0, 0.0)) == (50.0, 0.0, 0.0)
+
+
+def test_wide_faces_have_the_values_of_their_own_touches_and_not_of_narrow_ones_beside(empty):
+    """The corners of a plate are nearest to the middles of its narrow faces, which have no sure patches."""
+    empty.ops.mesh.primitive_cube_add()
+    empty.context.object.scale = (1.0, 0.7, 0.04)
+    painted, record = stability_map(empty)
+    assert record["patches"] - record["in_doubt"] == 2 < record["touched"]
+    assert np.all(values(painted.data, "reason") == PATCH)
 
 
 def test_a_map_of_a_plane_is_one_patch_without_error(empty, extension):
