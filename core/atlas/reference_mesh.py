@@ -23,7 +23,7 @@ from .tetrahedra import Indices
 NEAREST = 3  # The nearest triangle is looked for at this many of the nearest vertices.
 SAME = 1e-6  # Triangles that are nearer by a smaller share of the distance are as near.
 AHEAD = 0.95  # The normal at a foot gives the sign if the cosine of its angle to the way there is more.
-SAGITTA = 0.25  # The surface is within this share of an edge of a place on the mesh.
+SAGITTA = 0.5  # The surface is within this share of an edge of a place on the mesh.
 FAR = 2.0  # Places that are farther away than this many cells have the sign of the indicator.
 PREPARED = ("tree", "fans", "edge", "normals", "is_open", "angles")  # Each is found once for a mesh.
 # python -m benchmarks.measured judges these: where the surface goes on unfelt,

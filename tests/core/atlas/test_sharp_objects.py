@@ -175,7 +175,7 @@ def test_places_on_the_mesh_do_not_jump_to_another_wall_near_by(block):
     """The mesh is moved aside, as if it were the lower wall of a step whose upper one has a patch."""
     reference = block.reference
     moved = reference.mesh._replace(
-        vertices=reference.mesh.vertices + np.array([0.0, 0.0, 0.4 * reference.edge])
+        vertices=reference.mesh.vertices + np.array([0.0, 0.0, 0.7 * reference.edge])
     )
     top = np.flatnonzero(np.abs(reference.mesh.vertices - [0.0, 0.0, HALF[2]]).max(axis=1) < 0.3)
     distance, std = ReferenceMesh(moved, reference.indicator).distances(block.charts, moved.vertices[top])

@@ -265,10 +265,10 @@ def test_contacts_off_the_surface_put_it_in_doubt(ball):
     wide = result_of(loose.widened())
     distance, std = wide.distance(shifted)
     assert np.mean(np.abs(distance) <= 1.645 * std * 1.001) >= 0.9
-    # What patches differ by is a part of a deviation and does not grow with theirs.
+    # What patches differ by is taken off the variance of their mean, and does not grow with their variances.
     factor, grown = wide.charts.stds / loose.charts.stds, std / loose.distance(shifted)[1]
     assert factor == pytest.approx(factor.mean(), rel=1e-9)
-    assert grown.max() <= factor.max() * (1.0 + 1e-9)
+    assert 0.95 * factor.mean() < grown.min() <= grown.max() < 1.5 * factor.mean()
     assert np.median(grown) == pytest.approx(factor.mean(), rel=0.02)
     assert result_of(right.widened()).distance(ways)[1] == pytest.approx(right.distance(ways)[1], rel=0.5)
     assert result_of(wrong.widened()).distance(ways)[1] == pytest.approx(
