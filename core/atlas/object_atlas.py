@@ -271,7 +271,8 @@ class Atlas:
         """The atlas with deviations so large that 90 % of its check's contacts are in the 90 % interval.
 
         Those that contradict the surface do not count: they are of something else. What patches differ by is
-        taken off the variance of their mean and does not grow, so they grow more than once. Yields 1 each time.
+        taken off the variance of their mean and does not grow, so they grow more than once. Yields 1 after
+        each.
         """
         found, count = self, self.check.at_random
         within = ~self.contradicting[:count]

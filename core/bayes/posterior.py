@@ -21,16 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..arguments import Array
 from ..lapack import solved
 from ..patch.differential_geometry import Derivatives
-from ..patch.monge import (
-    DEGREE,
-    TERMS,
-    HeightField,
-    MongePatch,
-    derived_monomials,
-    exponents,
-    monomials,
-    polynomial_derivatives,
-)
+from ..patch.monge import DEGREE, TERMS, HeightField, MongePatch, exponents, monomials, polynomial_derivatives
 from . import kernel as process
 from .kernel import PARTIALS, derived_kernel, kernel, kernels, places_factor, weighted_kernel
 from .prior import FREE, ORDERS
@@ -215,26 +206,6 @@ class SurfacePosterior(HeightField):
         known, left = self._whitened_sums(_projected_terms().T, weights.sum(axis=1), within)
         own = sum(map(np.multiply, self.variances, _projected_kernels(tuple(process.LENGTHS))))
         return own + left.T @ left - known.T @ known
-
-    def curvature_stds(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Standard deviations of K and H of `polynomial` at n points, (n,) each, as if slopes were exact.
-
-        Second derivatives a, b, c are normally distributed, which gives the variance of ac - b^2 exactly.
-        """
-        _, zx, zy, *bent = derived_monomials(x, y, TERMS, PARTIALS)
-        slopes, (a, b, c) = self.polynomial @ np.array([zx, zy]), self.polynomial @ np.array(bent)
-        within = np.einsum("kin,ij,ljn->kln", bent, self.covariance, bent, optimize=True)
-        e, f, g = 1.0 + slopes[0] ** 2, slopes[0] * slopes[1], 1.0 + slopes[1] ** 2
-        gauss = np.array([c, -2.0 * b, a])
-        variance = np.einsum("kn,kln,ln->n", gauss, within, gauss)
-        variance += within[0, 0] * within[2, 2] + within[0, 2] ** 2
-        variance += 2.0 * within[1, 1] ** 2 - 4.0 * within[0, 1] * within[1, 2]
-        mean = np.array([g, -2.0 * f, e])
-        spread = np.einsum("kn,kln,ln->n", mean, within, mean)
-        area = e + g - 1.0  # EG - F^2
-        return np.sqrt(np.maximum(variance, 0.0)) / area**2, np.sqrt(np.maximum(spread, 0.0)) / (
-            2.0 * area**1.5
-        )
 
     def patch(self, degree: int) -> MongePatch:
         """The patch (1) of this degree that has the mean's curvatures and is nearest to it over the disk."""

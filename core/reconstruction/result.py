@@ -212,11 +212,6 @@ class Reconstruction:
         c = self.posterior.covariance
         return math.sqrt(c[2, 2] + 2.0 * c[2, 4] + c[4, 4]) / self.radius
 
-    def curvature_stds(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Standard deviations of K and H at n points of the frame, (n,) each, in 1/length^2 and 1/length."""
-        gauss, mean = self.posterior.curvature_stds(x / self.radius, y / self.radius)
-        return gauss / self.radius**2, mean / self.radius
-
     @property
     def gaussian_curvature_std(self) -> float:
         """Standard deviation of K at the point, in 1/length^2, for normally distributed k1 and k2."""

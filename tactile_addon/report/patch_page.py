@@ -13,7 +13,6 @@ from ..scene import patch_record
 from ..scene.attributes import DEVIATION, POSITION
 from ..scene.colors import shades, symmetric_range
 from ..scene.mesh_data import values
-from ..scene.shown import as_shown
 from ..touch import units
 from ..touch.types import Array, Object
 from ..touch.units import Unit
@@ -56,7 +55,7 @@ def _pictures(patch: Object, r: core.Reconstruction, record: Mapping[str, Any], 
     points, corners = values(patch.data, POSITION).astype(float), parts.corners(patch.data)
     contacts = r.contacts[:, :2] * record["radius"] / r.radius  # The object's mesh has this scale.
     for attribute, title, power in SHOWN if _has_mesh(record) else SHOWN[:-1]:
-        shown, low = as_shown(patch.data, attribute), 0.0 if attribute in patch_record.POSITIVE else -1.0
+        shown, low = values(patch.data, attribute), 0.0 if attribute in patch_record.POSITIVE else -1.0
         limit = symmetric_range(shown, parts.LEAST_RANGE)
         colors = shades(shown[corners].mean(axis=1), limit)
         picture = drawing.triangles(points[:, :2], corners, colors, contacts)

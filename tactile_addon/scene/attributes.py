@@ -9,9 +9,8 @@ import bpy
 DOMAIN: Any = "POINT"  # Each vertex has a value.
 POSITION = "position"  # Blender's own.
 CURVATURES = ("gaussian_curvature", "mean_curvature", "shape_index", "curvedness")
-# These have deviations, which are infinite where the curvatures of a whole object are unknown.
+# Those of a whole object have deviations, too, which are infinite where its curvatures are unknown.
 GAUSSIAN_STD, CURVATURE_STD = "gaussian_curvature_std", "mean_curvature_std"
-STD_OF = dict(zip(CURVATURES, (GAUSSIAN_STD, CURVATURE_STD), strict=False))
 DEVIATION = "deviation"  # Signed distances from the mesh that was touched, positive outside it.
 HEIGHT_STD = "height_std"
 COLOR = "curvature_color"

@@ -14,25 +14,7 @@ COLOR_STOPS = np.array([
     (253, 219, 199), (244, 165, 130), (214, 96, 77), (178, 24, 43),
 ]) / 255.0  # fmt: skip
 
-SURE = 2.0  # What is within this many deviations of the mean has its color.
-LEAST_STD = 1e-6  # A deviation counts as at least this share of the largest one.
 UNKNOWN = (0.5, 0.5, 0.5, 1.0)  # The color of what has no value, in sRGB.
-
-
-def beyond_doubt(values: Array, stds: Array) -> Array:
-    """Values (n,) shrunk to their mean by as much as deviations (n,) leave open (James and Stein, 1961).
-
-    The mean is weighted by precision; where a deviation is infinite, there is nothing but the mean.
-    """
-    known = np.isfinite(stds)
-    if not known.any():
-        return values
-    weights = 1.0 / np.maximum(stds, LEAST_STD * stds[known].max() or 1.0) ** 2
-    mean = float(np.average(values, weights=weights))
-    off = values - mean
-    doubt = np.minimum(SURE * stds, np.abs(off))
-    shrunk: Array = mean + off - np.divide(doubt**2, off, out=np.zeros_like(off), where=off != 0.0)
-    return shrunk
 
 
 def symmetric_range(values: Array, floor: float) -> float:

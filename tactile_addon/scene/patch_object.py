@@ -12,7 +12,7 @@ from mathutils import Matrix
 from ... import core
 from ..touch.touch_object import Touched
 from ..touch.types import Array, Object
-from .attributes import COLOR, DEVIATION, HEIGHT_STD, NORMAL, PLACE, POSITION, STD_OF
+from .attributes import COLOR, DEVIATION, HEIGHT_STD, NORMAL, PLACE, POSITION
 from .contour_mesh import fill_contours
 from .family import add
 from .mesh_data import ABOVE, emission, fill, own_mesh, values, write
@@ -154,7 +154,6 @@ def _fill_patch(obj: Object, touched: Touched) -> None:
     places = np.column_stack([result.domain.places(points[:, :2]), np.zeros(len(points))])
     attributes = [
         *((name, _shown(name, result, points)) for name in QUANTITIES_OF_A_FIT),
-        *zip(STD_OF.values(), result.curvature_stds(*points[:, :2].T), strict=True),
         (DEVIATION, deviation),
         (NORMAL, d.normal),
         (PLACE, places),
@@ -176,9 +175,6 @@ def _follow(obj: Object, touched: Touched) -> None:
     write(mesh, NORMAL, d.normal)
     if obj.tactile_colors in QUANTITIES_OF_A_FIT:
         write(mesh, obj.tactile_colors, _shown(obj.tactile_colors, result, points))
-    if obj.tactile_colors in STD_OF:
-        for name, std in zip(STD_OF.values(), result.curvature_stds(*plane.T), strict=True):
-            write(mesh, name, std)
 
 
 def _shown(name: str, result: core.Reconstruction, points: Array) -> Array:

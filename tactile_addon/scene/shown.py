@@ -9,9 +9,9 @@ import bpy
 import numpy as np
 
 from ..touch.touch_report import TouchReport
-from ..touch.types import Array, Object
+from ..touch.types import Object
 from . import colors
-from .attributes import COLOR, CURVATURE_STD, CURVATURES, STD_OF
+from .attributes import COLOR, CURVATURE_STD, CURVATURES
 from .mesh_data import ABOVE, own_mesh, values
 from .patch_record import (
     ATLAS_RECORD,
@@ -39,7 +39,7 @@ def recolor(obj: Object) -> None:
     """
     own_mesh(obj)
     shown, mesh = obj.tactile_colors, obj.data
-    shades, record = as_shown(mesh, shown), obj[RECORD if RECORD in obj else ATLAS_RECORD]
+    shades, record = values(mesh, shown), obj[RECORD if RECORD in obj else ATLAS_RECORD]
     floor = LEAST_RANGE * record["radius"] ** POWERS[shown]
     unknown = _unknown(mesh) if shown in CURVATURES else []
     curvedness = np.delete(values(mesh, "curvedness"), unknown)
@@ -54,13 +54,6 @@ def recolor(obj: Object) -> None:
         mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
     mesh.update()
     record["color_limit"] = limit
-
-
-def as_shown(mesh: bpy.types.Mesh, shown: str) -> Array:
-    """The values (n,) of a quantity that colors show: without differences that may be errors."""
-    found = values(mesh, shown)
-    is_known = STD_OF.get(shown, "") in mesh.attributes
-    return colors.beyond_doubt(found, values(mesh, STD_OF[shown])) if is_known else found
 
 
 def _unknown(mesh: bpy.types.Mesh) -> Any:

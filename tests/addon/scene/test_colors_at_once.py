@@ -102,29 +102,6 @@ def test_patches_that_differ_by_their_errors_do_not_run_through_each_other(empty
     assert lines.modifiers[0].strength == touches[1].modifiers[0].strength > 0.0
 
 
-def test_what_may_be_error_of_the_curvature_is_pale(empty):
-    """A cylinder has none of Gauss, though the fit has some between the ends of its curves."""
-    empty.ops.mesh.primitive_cylinder_add()
-    empty.context.object.name = "Sphere"
-    patch = touch(empty, (0.62, -0.77, 0.7), extent=0.0)
-    curvature, std = values(patch.data, "gaussian_curvature"), values(patch.data, "gaussian_curvature_std")
-    assert np.abs(curvature).max() > 0.4
-    assert (np.abs(curvature) < 2.0 * std).mean() > 0.5
-    shades = values(patch.data, "curvature_color", "color", 4)
-    green = shades[np.argmin(np.abs(curvature))]
-    assert np.abs(shades - green).max() < 0.35  # deep red and blue are .7 and .75 off
-    patch.tactile_colors = "mean_curvature"
-    shades = values(patch.data, "curvature_color", "color", 4)
-    assert np.abs(shades - green).max(axis=1).min() > 0.5  # H is -1/2, for sure
-
-
-def test_a_ball_has_one_color_all_over_a_patch(empty, ball):
-    patch = touch(empty, (0.6, -0.6, 0.53), extent=0.0)
-    assert np.ptp(values(patch.data, "gaussian_curvature")) > 0.3
-    shades = values(patch.data, "curvature_color", "color", 4)
-    assert np.ptp(shades, axis=0).max() < 0.4  # deep red and pale green are .95 apart
-
-
 def test_eevee_draws_a_patch_above_the_mesh_where_it_is_below_it(empty):
     empty.ops.mesh.primitive_monkey_add()
     empty.context.object.modifiers.new("Subdivision", "SUBSURF").levels = 2

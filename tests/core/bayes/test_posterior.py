@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from core import Contour, SamplingPlane, reconstruct, reconstruct_many, suggest_plane, track
 from core.bayes import evidence, joint_fit, posterior, prior, sextic
-from core.patch.monge import TERMS, monomials, polynomial_derivatives
+from core.patch.monge import TERMS, monomials
 from core.reconstruction import next_plane
 
 EXTENT = 12.0
@@ -44,23 +44,6 @@ def test_intervals_count_in_that_waviness_and_noise_are_estimates(count, freedom
     precision = data.heights[0, :-1, :-1] / hyper.noise**2 + np.diag(1.0 / hyper.prior[0])
     gaussian = np.linalg.inv(precision)
     assert found == pytest.approx(freedom / (freedom - 2.0) * gaussian, rel=1e-6)
-
-
-def test_deviations_of_curvatures_are_those_of_surfaces_at_random():
-    rng = np.random.default_rng(3)
-    mean = np.concatenate([[0.0, 0.0, -0.4, 0.0, 0.1], 0.02 * rng.normal(size=22)])
-    root = np.zeros((27, 28))
-    root[:, :-1] = np.diag(0.03 * rng.uniform(0.5, 1.0, 27)) @ np.linalg.qr(rng.normal(size=(27, 27)))[0]
-    root[:, :2] = 0.0  # slopes at the point are exact there
-    whole = posterior.SurfacePosterior(mean, root, 0.0, np.zeros((22, 22)))
-    x, y = np.array([0.0, 0.2, -0.3]), np.array([0.0, 0.1, 0.2])
-    drawn = mean + rng.normal(size=(20_000, 27)) @ root[:, :-1]
-    surfaces_at_random = [
-        posterior.Derivatives(*polynomial_derivatives(b, TERMS, x, y, posterior.PARTIALS)) for b in drawn
-    ]
-    for name, stds in zip(("gaussian_curvature", "mean_curvature"), whole.curvature_stds(x, y), strict=True):
-        found = np.std([getattr(one, name) for one in surfaces_at_random], axis=0)
-        assert stds == pytest.approx(found, rel=0.1)
 
 
 def test_the_patch_of_a_lower_degree_is_the_nearest_over_the_disk():
