@@ -231,7 +231,12 @@ def argmin_per_point(place: NDArray[np.intp], key: NDArray[Any], count: int) -> 
 
 
 def _weighted_mean(pairs: Pairs, w: Array, count: int) -> Blend:
-    """Weighted means. Deviations do not average out, because patches that rho contacts err alike."""
+    """Weighted means at `count` places, with the deviation of the mean distance.
+
+    Patches that share contacts err alike, so their deviations do not average out as independent ones do. But
+    the squared error of a mean is the mean squared error minus the mean square by which patches differ from
+    it (Krogh and Vedelsby 1995). It is at least the variance of the mean of patches that differ that much.
+    """
     place = pairs.point_index
 
     def total(values: Array) -> Array:
@@ -242,11 +247,10 @@ def _weighted_mean(pairs: Pairs, w: Array, count: int) -> Blend:
     there = some > 0.0
     scale = 1.0 / np.where(there, some, 1.0)
     mean = scale * total(pairs.distance)
-    # A mean's squared error is the mean squared error minus the mean square by which patches differ from it.
-    spread = scale * total((pairs.distance - mean[place]) ** 2)
-    share = np.bincount(place, (w * scale[place]) ** 2, count)
-    apart = spread * share / np.maximum(1.0 - share, share)
-    variance = np.maximum(scale * total(pairs.std**2) - spread, apart)
+    spread = scale * total(np.square(pairs.distance - mean[place]))
+    shares = np.bincount(place, np.square(w * scale[place]), count)
+    least = spread * shares / np.maximum(1.0 - shares, shares)
+    variance = np.maximum(scale * total(np.square(pairs.std)) - spread, least)
     up = normalized(np.stack([total(pairs.normal[:, i]) for i in range(3)], axis=1))
     best = argmin_per_point(place, -w, count)
     return Blend(
