@@ -180,7 +180,12 @@ class _Run:
             for turn in np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False):
                 reach = length * self.tolerance
                 way = along(scaled(e1, math.cos(turn)), e2, math.sin(turn))
-                start = along(along(point, way, reach), up, reach)
+                raised, start = along(point, up, reach), along(along(point, way, reach), up, reach)
+                # In a hole or a slot the finger meets another wall on its way up and across.
+                if self.surface.ray_cast(along(point, up, HAIR * reach), up, reach) or (
+                    self.surface.ray_cast(raised, way, reach)
+                ):
+                    continue
                 hit = self.surface.ray_cast(start, scaled(up, -1.0), 3.0 * reach)
                 if hit is not None:
                     contact, normal = contact_of(hit, 1.0)

@@ -741,13 +741,12 @@ def test_removing_a_plane_keeps_the_order_of_the_others(empty, ball):
 
 
 @pytest.mark.parametrize("shown", ["gaussian_curvature", "mean_curvature", "deviation", "height_std"])
-def test_the_colors_show_what_is_chosen_after_an_update_too(empty, ball, shown, extension):
-    as_shown = extension.tactile_addon.scene.shown.as_shown  # without what may be error
+def test_the_colors_show_what_is_chosen_after_an_update_too(empty, ball, shown):
     probe, patch = pick(empty, noise=0.01)
     patch.tactile_colors = shown
     for extent in (0.6, 0.5):
         probe.tactile_probe.extent = extent
-        limit, data = report_of(patch)["color_limit"], as_shown(patch.data, shown)
+        limit, data = report_of(patch)["color_limit"], values(patch, shown, "value", 1)
         least = 0.5 * np.median(values(patch, "curvedness", "value", 1)) ** 2
         least *= shown == "gaussian_curvature"
         assert limit == pytest.approx(max(np.percentile(np.abs(data), 98), least), rel=1e-5)

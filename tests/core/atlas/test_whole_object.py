@@ -48,6 +48,19 @@ def test_a_ball_is_closed_and_as_near_as_asked(ball):
     assert len(ball.patches) < 30
 
 
+@pytest.mark.parametrize("tolerance", [1e-2, 2e-2])
+def test_a_touch_in_a_narrow_hole_begins_on_its_wall_and_not_inside_the_object(tolerance):
+    """Places near the point for a larger first patch are farther away than the hole is wide."""
+
+    def distance(x, y, z):
+        return max(abs(x) - 1.0, abs(y) - 1.0, abs(z) - 0.5, 0.04 - math.hypot(x, y))
+
+    hole = solids.Solid(distance, (-0.04, 0.0, 0.0), (1.0, 0.0, 0.0))
+    frame = explored(hole, tolerance=tolerance, noise=1e-4, most=1).patches[0].frame
+    assert frame.origin == pytest.approx(hole.start, abs=1e-3)
+    assert distance(*(frame.origin + 1e-3 * frame.axes[:, 2])) > 0.0
+
+
 def test_an_atlas_is_printed_in_a_few_lines(ball):
     lines = repr(ball).splitlines()
     assert lines[0] == f"Atlas, {ball.status}: {ball.message}"
