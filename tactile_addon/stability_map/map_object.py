@@ -81,10 +81,10 @@ def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Ob
 
 
 def _paint(mesh: bpy.types.Mesh, touched: StabilityMap) -> None:
-    """Gives each vertex the values of the nearest touch."""
+    """Gives each vertex the values of its touch."""
     for name in MEASURES:
-        write(mesh, name, touched.measures[name][touched.nearest])
-    write(mesh, REASON, touched.reason[touched.nearest])
+        write(mesh, name, touched.measures[name][touched.touch_of])
+    write(mesh, REASON, touched.reason[touched.touch_of])
     write(mesh, MAP_COLOR, np.ones((len(mesh.vertices), 4)))
     mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = MAP_COLOR
 

@@ -60,7 +60,7 @@ class StabilityMap:
     places : n arrays (3,), the places to touch as the surface has them, in random order
     done : how many of these have been touched
     measures, reason : (n,), what was found by each touch; the fields of `measures` are MEASURES
-    nearest : index of the touch whose values each vertex of the mesh has, once the steps are done: that of
+    touch_of : index of the touch whose values each vertex of the mesh has, once the steps are done: that of
         the largest touched face at it, or else the nearest
     """
 
@@ -129,9 +129,9 @@ class StabilityMap:
 
         points = self.surface.points
         tree = cKDTree(self.places[: self.done])
-        self.nearest = np.empty(len(points), dtype=np.intp)
+        self.touch_of = np.empty(len(points), dtype=np.intp)
         for start in range(0, len(points), NEAREST_AT_ONCE):
-            self.nearest[start : start + NEAREST_AT_ONCE] = tree.query(
+            self.touch_of[start : start + NEAREST_AT_ONCE] = tree.query(
                 points[start : start + NEAREST_AT_ONCE]
             )[1]
             yield
@@ -140,7 +140,7 @@ class StabilityMap:
         touch[self._touched[: self.done]] = np.arange(self.done)
         order = np.argsort(self._areas[self.surface.owners], kind="stable")
         order = order[touch[self.surface.owners[order]] >= 0]
-        self.nearest[self.surface.triangles[order].ravel()] = np.repeat(touch[self.surface.owners[order]], 3)
+        self.touch_of[self.surface.triangles[order].ravel()] = np.repeat(touch[self.surface.owners[order]], 3)
 
     def _touch(self, numbers: Sequence[int]) -> Iterator[None]:
         """Makes the touches with these numbers, as a generator like `steps`."""
