@@ -151,7 +151,7 @@ def surface_at(charts: Charts, indicator: Indicator, points: Array, up: Array, b
 def surface_within_margin(
     charts: Charts, indicator: Indicator, points: Array, up: Array, band: float, margin: float = MARGIN
 ) -> SurfaceSample:
-    """The surface of `surface_at`, but only where patches are that count up to a margin."""
+    """The surface of `surface_at`, but only of patches within a margin of their rims."""
     pairs, count = charts.pairs(points, band, margin), len(points)
     pairs = pairs.chosen(np.einsum("mi,mi->m", pairs.normal, up[pairs.point_index]) > SIDEWAYS)
     rho = np.full(count, np.inf)

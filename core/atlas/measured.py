@@ -137,7 +137,7 @@ def _strokes(given: Sequence[ArrayLike | Contour], noise: float | None) -> tuple
 
 
 def _each_once(strokes: list[Contour]) -> tuple[list[Contour], Array]:
-    """The strokes without contacts that earlier ones have, too, which tell no more; all contacts (n, 3)."""
+    """The strokes without contacts that earlier ones have, too, which add nothing; all contacts (n, 3)."""
     points = np.vstack([np.empty((0, 3)), *(stroke.points for stroke in strokes)])
     order, starts = equal_points(points)
     is_first = np.zeros(len(points), dtype=bool)

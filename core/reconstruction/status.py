@@ -178,7 +178,7 @@ def _about_heights(r: Judged) -> Iterator[str]:
 def _about_frame(r: Judged) -> Iterator[str]:
     turn = r.posterior.turn(LIKELY if r.posterior.amplitude else CONFIDENCE)
     if turn > DOUBTFUL_TURN and not r.posterior.is_round:
-        yield (f"The principal directions may be {math.degrees(turn):.0f} degrees off: {_more_bend(r)}.")
+        yield f"The principal directions may be {math.degrees(turn):.0f} degrees off: {_more_bend(r)}."
     std = r.posterior.curvature_std()
     if std > DOUBTFUL_CURVATURE:
         yield (
