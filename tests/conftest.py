@@ -47,15 +47,9 @@ def empty(extension):
 @pytest.fixture
 def ball(empty):
     """A finely faceted sphere of radius 2, the active object."""
-    empty.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64, radius=2.0)
-    mesh = empty.context.object.data
-    # Blender numbers the faces of a sphere differently in each process: touches would begin elsewhere.
-    places, faces = [v.co[:] for v in mesh.vertices], [list(face.vertices) for face in mesh.polygons]
-    faces = sorted(face[(i := face.index(min(face))) :] + face[:i] for face in faces)
-    mesh.clear_geometry()
-    mesh.from_pydata(places, [], faces)
-    empty.context.view_layer.update()
-    return empty.context.object
+    from scenes import add_sphere
+
+    return add_sphere(empty)
 
 
 @pytest.fixture

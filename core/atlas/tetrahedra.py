@@ -48,18 +48,17 @@ def tetrahedra_of(cells: Indices) -> Generator[float, None, tuple[Indices, Indic
     strides = np.array([shape[1] * shape[2], shape[2], 1])
     # A lattice point is a number, so all corners of a tetrahedron are at fixed offsets from a center.
     centers = (2 * cells + 1 - low) @ strides
-    order, keys, distinct = np.sort(centers), [], np.zeros(0, dtype=np.intp)
+    order, faces, distinct = np.sort(centers), [], np.zeros(0, dtype=np.intp)
     for ahead, e1, e2 in (np.roll(strides, -axis) for axis in range(3)):
         at = np.minimum(np.searchsorted(order, centers + 2 * ahead), len(order) - 1)
         some = centers[order[at] == centers + 2 * ahead, None]
-        face = ahead + FACE_CORNERS @ (e1, e2)
-        for k in range(4):
-            keys.append(some + np.array([0, 2 * ahead, face[k], face[(k + 1) % 4]]))
-            distinct = _different(np.concatenate([distinct, _different(keys[-1])]))
-            yield 0.0
+        faces.append(some + np.array([0, 2 * ahead, *(ahead + FACE_CORNERS @ (e1, e2))]))
+        distinct = _different(np.concatenate([distinct, _different(faces[-1])]))
+        yield 0.0
     index = []
-    for each in keys:
-        index.append(np.searchsorted(distinct, each))
+    for each in faces:
+        points_of_face = np.searchsorted(distinct, each)
+        index += [points_of_face[:, [0, 1, 2 + k, 2 + (k + 1) % 4]] for k in range(4)]
         yield 0.0
     points: Indices = np.stack(np.unravel_index(distinct, shape), axis=1) + low
     return points, np.concatenate(index)

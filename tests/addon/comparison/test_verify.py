@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 from mathutils import Matrix
-from scenes import positions, values
+from scenes import add_sphere, positions, values
 
 RADIUS = 2.0
 TOP = (0.3, -0.2, 1.9)
@@ -19,9 +19,9 @@ TOUCH = {"target": "Sphere", "location": TOP, "extent": 0.6, "step": 0.06}
 
 
 def add_ball(bpy, radius=RADIUS, name="Sphere"):
-    bpy.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64, radius=radius)
-    bpy.context.object.name = name
-    return bpy.context.object
+    ball = add_sphere(bpy, radius=radius)
+    ball.name = name
+    return ball
 
 
 @pytest.fixture

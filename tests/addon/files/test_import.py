@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 import surfaces
-from scenes import PLACE, datablocks, made, positions, values
+from scenes import PLACE, add_sphere, datablocks, made, positions, values
 
 from core import Contacts, Contour, from_dict
 
@@ -301,7 +301,7 @@ def test_a_patch_goes_out_as_json(extension, empty, measured, tmp_path):
 
 
 def test_a_probes_patch_goes_out_too(extension, empty, tmp_path):
-    empty.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64, radius=2.0)
+    add_sphere(empty)
     empty.ops.tactile.pick(target="Sphere", location=(0.3, -0.2, 1.9), extent=0.6)
     for operator, name in (
         (empty.ops.tactile.export_contacts, "c.csv"),

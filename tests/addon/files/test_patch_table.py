@@ -7,6 +7,7 @@ import csv
 import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+from scenes import add_sphere
 
 
 @pytest.fixture
@@ -14,7 +15,7 @@ def probes(empty):
     """A scene in millimeters with a ball of radius 20 and two probes on it."""
     settings = empty.context.scene.unit_settings
     settings.system, settings.scale_length, settings.length_unit = "METRIC", 1e-3, "MILLIMETERS"
-    empty.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64, radius=20.0)
+    add_sphere(empty, radius=20.0)
     for place in ((0.0, -5.0, 19.0), (19.0, 3.0, 4.0)):
         empty.ops.tactile.pick(target="Sphere", location=place, new=True)
     return [obj for obj in empty.data.objects if obj.type == "EMPTY"]

@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 from mathutils import Euler, Matrix, Vector
-from scenes import by_hand, select, step
+from scenes import add_sphere, by_hand, select, step
 
 MOTION = Matrix.Translation((3.0, -2.0, 1.0)) @ Euler((0.5, 0.3, -0.8)).to_matrix().to_4x4()
 TOP = (0.3, -0.2, 1.9)
@@ -191,8 +191,7 @@ def test_undo_of_a_move_and_of_a_scale_brings_probe_and_patch_back(empty, suzann
 
 def test_a_probe_that_is_moved_to_another_object_or_gets_another_target_goes_with_that(empty, suzanne):
     probe, _ = pick(empty, (-0.05, -0.9, 0.6))
-    empty.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=2.0, location=(9, 0, 0))
-    ball = empty.context.object
+    ball = add_sphere(empty, location=(9, 0, 0))
     empty.context.view_layer.objects.active = probe
     pick(empty, (9.3, -0.2, 1.9), target=ball.name)
     assert (probe.parent, probe.tactile_probe.target) == (ball, ball)
@@ -213,8 +212,7 @@ def test_a_target_that_depends_on_the_probe_does_not_become_its_parent(empty, ex
 
 
 def test_a_probe_without_a_parent_touches_a_target_that_was_moved(empty, touches):
-    empty.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=2.0)
-    ball = empty.context.object
+    ball = add_sphere(empty)
     probe, _ = pick(empty, TOP, parent=False)
     ball.location.z = 0.1
     empty.context.view_layer.update()

@@ -7,6 +7,7 @@ import math
 import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+from scenes import add_sphere
 
 LIBRARY = 'Sphere Probe" comes from a library: make it local, or override it'
 WRITERS = ("add_plane", "add_planes", "update", "delete", "verify", "register")
@@ -15,7 +16,7 @@ WRITERS = ("add_plane", "add_planes", "update", "delete", "verify", "register")
 @pytest.fixture
 def library(empty, tmp_path):
     """The path of a file whose probe, patch and target are linked into the open scene."""
-    empty.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=2.0)
+    add_sphere(empty)
     empty.ops.tactile.pick(target="Sphere", location=(0.3, -0.2, 1.9), extent=0.6, plane_count=4)
     path = str(tmp_path / "library.blend")
     empty.ops.wm.save_as_mainfile(filepath=path)
@@ -115,7 +116,7 @@ def test_the_colors_of_a_linked_patch_stay(empty, library):
 @pytest.fixture
 def linked(empty, tmp_path):
     """A ball of a library, linked into the open scene."""
-    empty.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=2.0)
+    add_sphere(empty)
     path = str(tmp_path / "ball.blend")
     empty.ops.wm.save_as_mainfile(filepath=path)
     empty.ops.wm.read_homefile(use_empty=True)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+from scenes import add_sphere
 
 STALE = "This patch is from an earlier touch, and the probe or its target has changed since: touch again."
 
@@ -210,8 +211,7 @@ def test_a_renamed_target_gives_its_probe_to_another_that_is_chosen(empty, ball)
     empty.ops.tactile.pick(target="Sphere", location=(0.3, -0.2, 1.9), extent=0.6)
     probe = empty.context.object
     probe.tactile_probe.live = False
-    empty.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64, radius=2.0)
-    other, ball.name = empty.context.object, "Globe"
+    other, ball.name = add_sphere(empty), "Globe"
     empty.context.view_layer.update()
     probe.tactile_probe.target = other
     empty.context.view_layer.update()

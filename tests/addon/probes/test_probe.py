@@ -25,8 +25,7 @@ OPERATORS = ("add_plane", "add_planes", "remove_plane", "update", "delete")
 @pytest.fixture
 def ball(empty):
     """A finely faceted sphere of radius 2, the active object."""
-    empty.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=RADIUS)
-    return empty.context.object
+    return scenes.add_sphere(empty, segments=96, rings=48, radius=RADIUS)
 
 
 def pick(bpy, **arguments):
@@ -507,7 +506,7 @@ def test_without_a_target_the_probe_says_so_and_keeps_its_patch(
         assert in_world(patch) == pytest.approx(there, abs=1e-5)
         probe.location.x = probe.tactile_probe.extent = x
     assert "Traceback" not in capfd.readouterr().err
-    empty.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=2.1)
+    scenes.add_sphere(empty, segments=96, rings=48, radius=2.1)
     probe.tactile_probe.target = empty.context.object
     assert_touches(probe, patch, radius=2.1)
 
@@ -936,7 +935,7 @@ def test_a_change_touches_once_what_depends_on_it_and_nothing_else(empty, ball, 
     probes = [
         pick(empty, target="Sphere", location=Matrix.Rotation(turn, 3, "X") @ TOP)[1] for turn in range(3)
     ]
-    empty.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=RADIUS, location=(9, 0, 0))
+    scenes.add_sphere(empty, segments=96, rings=48, radius=RADIUS, location=(9, 0, 0))
     pick(empty, location=TOP + Vector((9, 0, 0)))
     update(empty)
     calls, surfaces = counted("probes.touch_again", "touch_at"), counted("touch.surface", "size_of")

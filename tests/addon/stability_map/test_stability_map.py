@@ -149,8 +149,8 @@ def test_touches_that_choose_their_extent_are_those_of_the_other_operator(empty,
 
 def test_an_automatic_extent_fits_the_place(empty, ridge):
     """The extent is long off a ridge and short on it, so fewer patches are in doubt."""
-    painted, record = stability_map(empty, target=ridge.name, spacing=0.1)
-    fixed, given = stability_map(empty, target=ridge.name, spacing=0.1, extent=0.5)
+    painted, record = stability_map(empty, target=ridge.name, spacing=0.2)
+    fixed, given = stability_map(empty, target=ridge.name, spacing=0.2, extent=0.5)
     assert (record["extent"], record["step"]) == (0.0, 0.0)
     assert record["in_doubt"] < 0.5 * given["in_doubt"]
     x, y = np.abs(positions(painted.data)[:, :2]).T
@@ -204,19 +204,19 @@ def test_a_probe_is_in_doubt_where_the_map_has_no_patch(empty, touched, shape, e
             assert refused == record["message"].startswith("The point is at a")
 
 
-@pytest.mark.parametrize("name", QUANTITIES)
-def test_what_is_refused_has_no_value_and_a_color_of_its_own(empty, name):
+def test_what_is_refused_has_no_value_and_a_color_of_its_own(empty):
     empty.ops.mesh.primitive_cube_add(size=2.0)
     edited(empty, number_cuts=9)
     painted, _ = stability_map(empty, spacing=0.1, extent=0.8, step=0.1)
-    painted.tactile_map_colors = name
     refused = values(painted.data, "reason") == CREASE
-    assert np.all(values(painted.data, name)[refused] == -1.0)
-    assert values(painted.data, name)[~refused].min() >= 0.0
-    shades = values(painted.data, "stability_color", "color", 4)
-    assert np.ptp(shades[refused], axis=0).max() == 0.0
-    assert shades[refused].max(axis=0)[:3].max() < 0.1
-    assert shades[~refused].min(axis=0)[0] > 0.4
+    for name in QUANTITIES:
+        painted.tactile_map_colors = name
+        assert np.all(values(painted.data, name)[refused] == -1.0)
+        assert values(painted.data, name)[~refused].min() >= 0.0
+        shades = values(painted.data, "stability_color", "color", 4)
+        assert np.ptp(shades[refused], axis=0).max() == 0.0
+        assert shades[refused].max(axis=0)[:3].max() < 0.1
+        assert shades[~refused].min(axis=0)[0] > 0.4
 
 
 def test_a_sheet_is_refused_at_its_border_and_around_a_hole(empty, touched):
@@ -230,8 +230,9 @@ def test_a_sheet_is_refused_at_its_border_and_around_a_hole(empty, touched):
     found = touched(obj, spacing=0.01, extent=0.25, step=0.05)
     co = np.array(found.places)[:, :2]
     border, to_hole = 1.0 - np.abs(co).max(axis=1), np.linalg.norm(co, axis=1) - 0.3
-    assert np.all(found.reason[border < 0.02] == EDGE)
-    assert np.all(found.reason[to_hole < 0.03] == EDGE)
+    for at_edge in (border < 0.03, to_hole < 0.03):
+        assert np.any(at_edge)
+        assert np.all(found.reason[at_edge] == EDGE)
     assert np.all(found.reason[(border > 0.11) & (to_hole > 0.15)] == PATCH)
     assert found.report()["refused"]["edge"] == np.count_nonzero(found.reason == EDGE)
 
@@ -293,9 +294,9 @@ def test_the_copy_has_its_attributes_and_the_target_is_untouched(empty, ball):
 
 
 def test_lengths_are_those_of_the_world(empty, ball):
-    _, small = stability_map(empty, spacing=0.25, extent=0.5)
+    _, small = stability_map(empty, spacing=0.5, extent=0.5)
     ball.scale, ball.location, ball.rotation_euler = (10.0, 10.0, 10.0), (1e4, 0.0, 0.0), (1.0, 2.0, 3.0)
-    _, large = stability_map(empty, target="Sphere", spacing=2.5, extent=5.0)
+    _, large = stability_map(empty, target="Sphere", spacing=5.0, extent=5.0)
     assert large["points"] == pytest.approx(small["points"], rel=0.05)
     for name in ("error_median", "height_std_median"):
         assert large[name] == pytest.approx(10.0 * small[name], rel=0.05)

@@ -125,7 +125,7 @@ def test_two_balls_in_contact_do_not_end_the_touches_or_fill_what_is_between():
         return min(math.hypot(x + 1.0, y, z), math.hypot(x - 1.0, y, z)) - 1.0
 
     solid = solids.Solid(distance, (-2.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
-    atlas = explored(solid, tolerance=8e-3, most=150)
+    atlas = explored(solid, tolerance=0.02, most=80)
     y = np.linspace(0.45, 0.9, 20)
     between, std = atlas.distance(np.column_stack([np.zeros(20), y, np.zeros(20)]))
     assert (between[np.isfinite(std)] > 0.0).all()
