@@ -23,21 +23,22 @@ TYPED := build/typed/tactile_patch
 BESIDE := -n auto --dist worksteal
 # Tests of core share touched objects, so one process runs a whole file; the longest files come first.
 test-core: BESIDE := -n auto --dist loadfile --no-loadscope-reorder
-test test-core test-cluster: export OMP_NUM_THREADS = 1
-test test-core test-cluster: export OPENBLAS_NUM_THREADS = 1
+test test-core test-long test-cluster: export OMP_NUM_THREADS = 1
+test test-core test-long test-cluster: export OPENBLAS_NUM_THREADS = 1
 
 ZIP := build/tactile_patch.zip
 # Folders too, so that a deleted file counts as a change.
 SOURCES := blender_manifest.toml __init__.py LICENSE tools/build.py \
 	$(shell find core tactile_addon docs -name __pycache__ -prune -o -print)
 
-.PHONY: help demo dataset test test-core test-cluster fuzz chart paper stability site figures film lesson sample zip zip-nowheels \
+.PHONY: help demo dataset test test-core test-long test-cluster fuzz chart paper stability site figures film lesson sample zip zip-nowheels \
 	release clean
 
 help:
 	@echo 'make demo [MESH=FILE]  rebuild a patch on a mesh and draw it'
 	@echo 'make test              check style and types, then test the extension in Blender'
 	@echo 'make test-core         run the tests of core alone, without Blender'
+	@echo 'make test-long         run the tests that take long: many touches, whole objects, samples of the docs'
 	@echo 'make fuzz              try more than 10,000 odd inputs, in a quarter of an hour'
 	@echo 'make chart [QUICK=1]   draw speed against accuracy beside other methods, in build/charts'
 	@echo 'make paper             repeat the experiments of the paper, beside its figures'
@@ -63,10 +64,13 @@ test: $(ZIP) | $(TYPED)
 	$(VENV_PY) -m ruff format --check
 	$(VENV_PY) -m mypy core
 	$(VENV_PY) -m mypy -p tactile_patch.tactile_addon
-	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest $(BESIDE) --ignore tests/cluster
+	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest $(BESIDE) -m "not long" --ignore tests/cluster
 
 test-core: $(READY)
-	$(VENV_PY) -m pytest $(BESIDE) --hypothesis-profile=quick tests/core/scan tests/core tests/test_rooms.py
+	$(VENV_PY) -m pytest $(BESIDE) -m "not long" --hypothesis-profile=quick tests/core/scan tests/core tests/test_rooms.py
+
+test-long: $(ZIP)
+	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest $(BESIDE) -m long --ignore tests/cluster
 
 test-cluster: $(CLUSTER)
 	$(VENV_PY) -m mypy cluster

@@ -133,6 +133,7 @@ def assert_printed(shown, out):
         assert numbers[0] == pytest.approx(numbers[1], rel=0.2), f"{line}\n{printed[words]}"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("page", PAGES)
 def test_samples_run(page, empty, command, folder):
     scope, out = names(page), None

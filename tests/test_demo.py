@@ -17,6 +17,7 @@ from mathutils import Vector
 from tools import demo
 
 
+@pytest.mark.long
 def test_a_rendered_pixel_has_the_color_that_the_bar_has_for_its_curvature(extension, tmp_path):
     import bpy
     from bpy_extras.object_utils import world_to_camera_view
@@ -77,6 +78,7 @@ def test_a_mesh_file_can_be_touched(extension, scans, name):
     assert report["vertex_distance_mean"] < 0.05 * report["radius"]
 
 
+@pytest.mark.long
 def test_the_example_makes_many_patches_under_blender_as_a_module(empty, tmp_path):
     empty.ops.mesh.primitive_torus_add(major_segments=96, minor_segments=48)
     empty.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))

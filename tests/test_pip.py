@@ -32,6 +32,7 @@ def wheel(tmp_path_factory):
     return path
 
 
+@pytest.mark.long
 def test_the_wheel_is_the_core_and_nothing_else(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = {name for name in archive.namelist() if ".dist-info/" not in name}
@@ -48,6 +49,7 @@ def test_the_wheel_is_the_core_and_nothing_else(wheel):
         assert f"\n{line}" in metadata
 
 
+@pytest.mark.long
 def test_the_lines_of_the_readme_run_in_a_new_environment(wheel, tmp_path):
     venv.create(tmp_path / "env", with_pip=True)
     python = tmp_path / "env" / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")

@@ -23,6 +23,7 @@ def robot(monkeypatch):
     return module
 
 
+@pytest.mark.long
 def test_the_robot_stops_goes_on_and_reaches_the_tolerance(robot, monkeypatch, tmp_path, capsys):
     path = tmp_path / "contacts.csv"
     given = ["robot.py", str(path), "--tolerance", "0.3"]

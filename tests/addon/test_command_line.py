@@ -52,6 +52,7 @@ def test_every_option_arrives(command, files):
     assert bpy.data.objects["Sphere Patch"]["tactile"]["degree"] == 5
 
 
+@pytest.mark.long
 def test_a_whole_object_from_a_file(command, files):
     output = files / "whole.ply"
     options = ("--tolerance", "0.01", "--edge", "0.2", "--seed", "1", "--json", "-", "--output", output)
@@ -108,6 +109,7 @@ def test_every_option_of_a_map_arrives_and_the_copy_is_saved(command, files):
     assert f"element vertex {len(painted.data.vertices)}\n" in head
 
 
+@pytest.mark.long
 def test_a_map_says_how_far_it_is(command, files):
     code, _, err = command("map", files / "ball.ply", "--spacing", 0.3)
     assert code == 0

@@ -383,6 +383,7 @@ def others(before, after, allowed):
     }
 
 
+@pytest.mark.long
 @given(st.data())
 @in_time
 def test_a_touch_in_any_scene(empty, data):
@@ -430,6 +431,7 @@ def examine_map(painted):
     event("map, in doubt" if record["in_doubt"] else "map, patches" if record["patches"] else "map, none")
 
 
+@pytest.mark.long
 @given(st.data())
 @in_time
 def test_a_stability_map_in_any_scene(empty, data):
@@ -504,6 +506,7 @@ def press(bpy, probe, draw):
 CHANGES = (shift, shift, number, number, number, retarget, reshape, delete, rename, unlive, press)
 
 
+@pytest.mark.long
 @given(st.data())
 @in_time
 def test_a_probe_in_any_scene(empty, capfd, data):
@@ -624,6 +627,7 @@ def test_any_command_line(extension, balls, capfd, data):
         assert "error: " in err
 
 
+@pytest.mark.long
 def test_a_million_faces(empty):
     """A mesh that is only large gets a good patch."""
     empty.ops.mesh.primitive_grid_add(x_subdivisions=1000, y_subdivisions=1000, size=4.0)

@@ -116,6 +116,7 @@ def test_without_a_mesh_the_contacts_are_what_deviates(command, tmp_path):
     assert page.counts["figure"] == 3  # two pictures, for there is no mesh to deviate from, and the histogram
 
 
+@pytest.mark.long
 def test_the_page_of_a_map(command, files, tmp_path):
     arguments = ("--spacing", 1, "--extent", 0.6, "--report", tmp_path / "map.html")
     assert command("map", files / "ball.ply", *arguments)[0] == 0
@@ -132,6 +133,7 @@ def test_the_page_of_a_map(command, files, tmp_path):
     assert re.search(r"(\d+) patches at \1 points, 0 in doubt", text)
 
 
+@pytest.mark.long
 def test_the_page_of_a_whole_object(command, files, tmp_path):
     arguments = (
         "--tolerance",

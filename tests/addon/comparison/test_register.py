@@ -49,6 +49,7 @@ def forehead(obj, bpy):
     return obj.matrix_world @ point
 
 
+@pytest.mark.long
 def test_a_lost_patch_comes_back_with_its_contours(empty, suzanne):
     patch = touched(empty, suzanne, forehead(suzanne, empty))
     truth = lost(empty, patch)
@@ -142,6 +143,7 @@ def imported(bpy, suzanne, tmp_path):
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["register", "verify"])
 def test_a_patch_of_a_file_asks_for_a_mesh_and_takes_the_one_in_its_field(empty, suzanne, tmp_path, name):
     patch = imported(empty, suzanne, tmp_path)

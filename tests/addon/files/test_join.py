@@ -71,6 +71,7 @@ def joined(bpy, paths, **options):
     return made(bpy.ops.tactile.import_contacts, "tactile_object", **place, whole=True, **options)
 
 
+@pytest.mark.long
 def test_contacts_of_three_files_become_one_closed_surface(empty, three_files):
     surface, record = joined(empty, three_files, tolerance=0.02)
     assert surface.name == "part0.csv and 2 more Surface"
@@ -97,6 +98,7 @@ def test_one_patch_of_files_with_points_of_their_own_is_still_refused(empty, thr
         empty.ops.tactile.import_contacts(directory=str(three_files[0].parent), files=files)
 
 
+@pytest.mark.long
 def test_where_no_normals_were_measured_the_outer_side_is_required(empty, two_halves):
     before = datablocks(empty)
     with pytest.raises(
@@ -114,6 +116,7 @@ def test_where_no_normals_were_measured_the_outer_side_is_required(empty, two_ha
         assert (normals.reshape(-1, 3)[:, 2] > 0.2).all()
 
 
+@pytest.mark.long
 def test_files_may_tell_the_outer_side_unless_they_contradict_each_other(empty, write):
     up = write("up.csv", [Contour(row) for row in raster(ROWS)], outward=[0.0, 0.0, 1.0])
     assert joined(empty, [up])[1]["patches"] > 1
@@ -142,6 +145,7 @@ def test_too_few_contacts_get_a_sentence(empty, write):
         joined(empty, [few], outward=(0, 0, 1))
 
 
+@pytest.mark.long
 def test_the_shell_joins_them_too(command, two_halves, tmp_path):
     paths = tmp_path / "out.json", tmp_path / "out.ply", tmp_path / "out.html"
     outputs = [word for pair in zip(("--json", "--output", "--report"), paths, strict=True) for word in pair]
@@ -161,6 +165,7 @@ def test_the_shell_joins_them_too(command, two_halves, tmp_path):
     assert "outward: expected a direction" in err.lower()
 
 
+@pytest.mark.long
 def test_the_shell_has_no_doubt_about_a_closed_surface(command, three_files):
     code, out, _ = command("join", *three_files, "--tolerance", 0.02)
     assert code == 0

@@ -60,6 +60,7 @@ def slide(bpy, probe, patch, xs):
     return reports
 
 
+@pytest.mark.long
 def test_while_the_point_is_dragged_extent_and_verdict_are_those_of_its_end(empty, ridge, gesture):
     probe, patch = pick(empty, ridge, -0.6)
     first = report_of(patch)

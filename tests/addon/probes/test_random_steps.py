@@ -23,6 +23,7 @@ def tidy(extension):
     bpy.context.view_layer.update()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [SEED, SEED + 1])
 def test_after_any_steps_all_agree_or_the_patch_says_that_it_is_outdated(
     empty, extension, tmp_path, capfd, seed

@@ -161,6 +161,7 @@ def test_every_row_says_what_it_is(said, extension, ball):
     assert addon.sidebar.rows.tip_of("Error on 9 More") != addon.sidebar.rows.tip_of("Error on Curves")
 
 
+@pytest.mark.long
 def test_a_map_knows_about_how_many_points_it_will_touch(extension, empty):
     empty.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64)
     ball = empty.context.object

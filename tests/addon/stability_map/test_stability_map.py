@@ -60,6 +60,7 @@ def edited(bpy, **cuts):
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
+@pytest.mark.long
 def test_a_ball_is_alike_all_over(empty):
     # Some touches would take facets twice as large for texture, and others would not.
     empty.ops.mesh.primitive_uv_sphere_add(segments=256, ring_count=128, radius=2.0)
@@ -97,6 +98,7 @@ def add_head(bpy):
     bpy.context.object.modifiers.new("Subdivision", "SUBSURF").levels = 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("add", "least"),
     [
@@ -147,6 +149,7 @@ def test_touches_that_choose_their_extent_are_those_of_the_other_operator(empty,
         assert found.measures["height_std"][number] == pytest.approx(report["height_std"], rel=0.02)
 
 
+@pytest.mark.long
 def test_an_automatic_extent_fits_the_place(empty, ridge):
     """The extent is long off a ridge and short on it, so fewer patches are in doubt."""
     painted, record = stability_map(empty, target=ridge.name, spacing=0.2)
@@ -168,6 +171,7 @@ def test_a_map_with_an_automatic_extent_says_so(empty, ridge, extension):
     assert stability_map_room.map_object.inputs_of(painted)["extent"] == 0.0  # a probe on the map gets this
 
 
+@pytest.mark.long
 def test_a_cube_has_patches_on_its_faces_and_none_at_its_edges(empty, touched):
     empty.ops.mesh.primitive_cube_add(size=2.0)
     edited(empty, number_cuts=9)
@@ -182,6 +186,7 @@ def test_a_cube_has_patches_on_its_faces_and_none_at_its_edges(empty, touched):
     assert found.report()["refused"]["crease"] == np.count_nonzero(found.reason == CREASE)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("shape", "extent"), [("cube", 0.25), ("grid", 0.25), ("grid", 0.0)])
 def test_a_probe_is_in_doubt_where_the_map_has_no_patch(empty, touched, shape, extent):
     if shape == "cube":
@@ -204,6 +209,7 @@ def test_a_probe_is_in_doubt_where_the_map_has_no_patch(empty, touched, shape, e
             assert refused == record["message"].startswith("The point is at a")
 
 
+@pytest.mark.long
 def test_what_is_refused_has_no_value_and_a_color_of_its_own(empty):
     empty.ops.mesh.primitive_cube_add(size=2.0)
     edited(empty, number_cuts=9)
@@ -219,6 +225,7 @@ def test_what_is_refused_has_no_value_and_a_color_of_its_own(empty):
         assert shades[~refused].min(axis=0)[0] > 0.4
 
 
+@pytest.mark.long
 def test_a_sheet_is_refused_at_its_border_and_around_a_hole(empty, touched):
     obj = grid(empty, 40)
     mesh = bmesh.new()
@@ -237,6 +244,7 @@ def test_a_sheet_is_refused_at_its_border_and_around_a_hole(empty, touched):
     assert found.report()["refused"]["edge"] == np.count_nonzero(found.reason == EDGE)
 
 
+@pytest.mark.long
 def test_each_of_nested_walls_is_compared_with_itself(empty, ball):
     """The wall of the inner ball is nearer to that of the outer one than the extent."""
     empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=1.9)
@@ -250,6 +258,7 @@ def test_each_of_nested_walls_is_compared_with_itself(empty, ball):
         assert error[wall].max() < 0.004
 
 
+@pytest.mark.long
 def test_a_bump_between_the_curves_shows_as_error(empty):
     """What no curve has felt raises no doubt, but it is an error."""
     obj = grid(empty, 120)
@@ -264,6 +273,7 @@ def test_a_bump_between_the_curves_shows_as_error(empty):
     assert error[ok & (away > 0.9)].max() < 1e-6
 
 
+@pytest.mark.long
 def test_the_copy_has_its_attributes_and_the_target_is_untouched(empty, ball):
     ball.data.attributes.new("error", "BOOLEAN", "FACE")  # the name is taken by another type
     ball.data.materials.append(empty.data.materials.new("Own"))
@@ -293,6 +303,7 @@ def test_the_copy_has_its_attributes_and_the_target_is_untouched(empty, ball):
     assert [material.name for material in mesh.materials] == ["Tactile Stability"]
 
 
+@pytest.mark.long
 def test_lengths_are_those_of_the_world(empty, ball):
     _, small = stability_map(empty, spacing=0.5, extent=0.5)
     ball.scale, ball.location, ball.rotation_euler = (10.0, 10.0, 10.0), (1e4, 0.0, 0.0), (1.0, 2.0, 3.0)
@@ -326,6 +337,7 @@ def test_touched_points_are_a_spacing_apart_and_leave_no_gap():
     assert part.query(points)[0].max() < 0.6
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_map(empty, ball):
     one, two, other = (
         stability_map(empty, target="Sphere", spacing=0.7, noise=0.01, seed=seed)[0] for seed in (1, 1, 2)
@@ -352,6 +364,7 @@ def test_one_undo_step(empty, ball):
     assert datablocks(empty) == before
 
 
+@pytest.mark.long
 def test_a_vertex_without_a_face_is_not_touched(empty, ball):
     ball.data.vertices.add(1)
     ball.data.vertices[-1].co = (0.0, 0.0, 2.5)

@@ -57,6 +57,7 @@ def test_a_target_that_does_not_stay_is_reported_at_once(empty, ball, taken, dis
             require(empty.context)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("how", ["vertex", "modifier"])
 def test_another_shape_is_noticed_soon_and_for_sure_in_the_end(empty, ball, taken, how):
     if how == "vertex":

@@ -116,6 +116,7 @@ def test_the_shell_asks_for_planes_too(command, files):
     assert "has become ±" in out
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "noise"), [("cad_block.stl", 0.0), ("shell_gastropod.stl", 0.05)])
 def test_no_patch_across_an_edge_or_a_rib(empty, extension, scans, name, noise):
     """Touches without a warning, all over the mesh, are off it by no more than they say."""

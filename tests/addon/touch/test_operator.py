@@ -369,6 +369,7 @@ def test_an_eye_hidden_object_is_touched_as_it_evaluates(empty, ball):
     assert ball.hide_get()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("modifier", [None, "SUBSURF"])
 def test_edit_mode_is_felt_with_its_unsaved_edits_and_stays(empty, ball, modifier):
     if modifier:

@@ -19,6 +19,7 @@ def edges(mesh):
     return np.linalg.norm(np.diff(positions(mesh)[ends], axis=1), axis=2)
 
 
+@pytest.mark.long
 def test_another_edge_length_needs_no_touches(empty, surface):
     before, graph = surface["tactile_object"].to_dict(), surface["tactile_graph"]
     surface.tactile_range = 0.5
@@ -38,6 +39,7 @@ def test_another_edge_length_needs_no_touches(empty, surface):
     assert surface["tactile_object"]["vertices"] == before["vertices"]
 
 
+@pytest.mark.long
 def test_where_a_wall_is_thin_the_report_has_the_length_of_edges_that_were_made(empty, extension):
     empty.ops.mesh.primitive_cube_add()
     empty.context.object.scale.z = 0.05
@@ -49,6 +51,7 @@ def test_where_a_wall_is_thin_the_report_has_the_length_of_edges_that_were_made(
     assert rows["Edge Length"].endswith(" cm")
 
 
+@pytest.mark.long
 def test_an_edge_length_that_does_not_suit_the_object_changes_nothing(empty, surface):
     before = surface["tactile_object"].to_dict()
     with pytest.raises(RuntimeError, match="The edge length 5 m is larger than 2 m"):
@@ -56,6 +59,7 @@ def test_an_edge_length_that_does_not_suit_the_object_changes_nothing(empty, sur
     assert surface["tactile_object"].to_dict() == before
 
 
+@pytest.mark.long
 def test_only_the_last_surface_can_be_meshed_again(empty, surface, ball):
     empty.context.view_layer.objects.active = ball
     made(empty.ops.tactile.touch_all_over, "tactile_object", tolerance=0.05, most=2)
@@ -65,6 +69,7 @@ def test_only_the_last_surface_can_be_meshed_again(empty, surface, ball):
         empty.ops.tactile.mesh_again(edge=0.3)
 
 
+@pytest.mark.long
 def test_a_range_is_given_in_the_unit_of_the_legend(surface):
     own = surface["tactile_object"]["color_limit"]
     surface.tactile_range = 2.0
@@ -73,6 +78,7 @@ def test_a_range_is_given_in_the_unit_of_the_legend(surface):
     assert surface["tactile_object"]["color_limit"] == own
 
 
+@pytest.mark.long
 def test_the_farthest_place_is_shown_where_the_surface_is_now(empty, surface):
     record = surface["tactile_object"].to_dict()
     surface.location.x += 3.0
@@ -86,6 +92,7 @@ def test_the_farthest_place_is_shown_where_the_surface_is_now(empty, surface):
     assert empty.context.view_layer.objects.active == surface
 
 
+@pytest.mark.long
 def test_quick_and_fine_have_other_tolerances(empty, ball):
     for accuracy, share in (("quick", 200), ("normal", 500), ("fine", 1250)):
         empty.context.view_layer.objects.active = ball
@@ -94,6 +101,7 @@ def test_quick_and_fine_have_other_tolerances(empty, ball):
         assert record["tolerance"] == pytest.approx(4.0 / share)
 
 
+@pytest.mark.long
 def test_a_dialog_can_tell_how_many_touches_there_will_be(extension, empty, ball):
     expected = extension.tactile_addon.whole_object.expected.Expected()
     words = expected.words(ball, empty.context, 0.02, "normal", 0.0)

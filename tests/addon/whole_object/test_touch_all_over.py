@@ -23,6 +23,7 @@ def touched(bpy, **arguments):
     return made(bpy.ops.tactile.touch_all_over, "tactile_object", **arguments)
 
 
+@pytest.mark.long
 def test_a_ball_is_closed_and_where_the_ball_is(empty, ball):
     ball.matrix_world = Matrix.Translation((5.0, 6.0, 7.0)) @ Matrix.Rotation(0.5, 4, "X")
     empty.context.view_layer.update()
@@ -47,6 +48,7 @@ def test_a_ball_is_closed_and_where_the_ball_is(empty, ball):
     assert set(values(surface.data, "patch")) <= set(range(record["patches"]))
 
 
+@pytest.mark.long
 def test_colors_show_what_is_chosen(empty, ball):
     surface, record = touched(empty, tolerance=0.01)
     for shown in ("height_std", "deviation", "gaussian_curvature"):
@@ -58,6 +60,7 @@ def test_colors_show_what_is_chosen(empty, ball):
         assert surface["tactile_object"]["color_limit"] == pytest.approx(max(wild, least), rel=1e-5)
 
 
+@pytest.mark.long
 def test_near_the_edges_of_a_cube_curvatures_are_unknown_and_gray(empty, extension):
     empty.ops.mesh.primitive_cube_add(size=2.0)
     surface, record = touched(empty)
@@ -111,6 +114,7 @@ def test_what_cannot_be_is_refused_and_nothing_is_left(empty, ball, inputs, mess
     assert datablocks(empty) == before
 
 
+@pytest.mark.long
 def test_a_budget_ends_it_with_what_there_is(empty, ball, extension):
     surface, record = touched(empty, tolerance=0.01, most=3)
     assert record["touches"] == 3
@@ -149,6 +153,7 @@ def test_nothing_begins_where_no_face_has_an_area(empty):
     assert datablocks(empty) == before
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("shape", "least"), [("cube", 4), ("plane", 1)])
 def test_faces_without_vertices_inside_are_begun_in_their_middle(empty, shape, least):
     """One touch feels a whole plane, or a side of the cube."""
@@ -156,6 +161,7 @@ def test_faces_without_vertices_inside_are_begun_in_their_middle(empty, shape, l
     assert touched(empty, most=5)[1]["patches"] >= least
 
 
+@pytest.mark.long
 def test_what_is_loose_is_no_part_of_the_object(empty, ball):
     ball.data.vertices.add(1)
     ball.data.vertices[-1].co = (1e3, 0.0, 0.0)
@@ -163,6 +169,7 @@ def test_what_is_loose_is_no_part_of_the_object(empty, ball):
     assert touched(empty, most=2)[1]["size"] == pytest.approx(4.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scale", [(-1.0, 1.0, 1.0), (1.0, 2.0, 3.0), (1e-5, 1e-5, 1e-5), (1e5, 1e5, 1e5)])
 def test_a_scaled_object_is_touched_as_it_is(empty, ball, scale):
     ball.scale = scale
@@ -177,6 +184,7 @@ def test_a_scaled_object_is_touched_as_it_is(empty, ball, scale):
     assert (np.einsum("ni,ni->n", normals, corners.mean(axis=1)) > 0.0).all()
 
 
+@pytest.mark.long
 def test_another_process_touches_the_same(files):
     """All bits are the same, in any order of sets. The ball is a file, as the faces of new spheres vary."""
     code = (
@@ -196,6 +204,7 @@ def test_another_process_touches_the_same(files):
     assert found[0] == found[1]
 
 
+@pytest.mark.long
 def test_modifiers_and_the_active_of_several_count(empty, ball):
     empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=1.0, location=(9, 0, 0))
     other = empty.context.object
@@ -207,6 +216,7 @@ def test_modifiers_and_the_active_of_several_count(empty, ball):
     assert np.linalg.norm(positions(surface.data), axis=1) == pytest.approx(1.25, abs=0.03)
 
 
+@pytest.mark.long
 def test_a_probe_or_a_place_says_where_to_begin(empty, ball):
     surface, _ = touched(empty, location=(0.0, 0.0, 2.0), tolerance=0.01, most=1)
     assert np.abs(positions(surface.data)[:, 2]).min() > 0.5
@@ -215,6 +225,7 @@ def test_a_probe_or_a_place_says_where_to_begin(empty, ball):
     assert np.abs(positions(surface.data)[:, 1]).min() > 0.5
 
 
+@pytest.mark.long
 def test_an_edited_surface_has_no_report(empty, ball, tmp_path):
     surface, _ = touched(empty, tolerance=0.02)
     surface.data.attributes.remove(surface.data.attributes["deviation"])

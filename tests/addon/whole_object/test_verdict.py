@@ -42,6 +42,7 @@ def touches_of(empty, extension):
     return touches_of
 
 
+@pytest.mark.long
 def test_a_cube_is_a_cube_with_sharp_edges(empty, extension):
     empty.ops.mesh.primitive_cube_add(size=2.0, location=(3.0, 0.0, 0.0))
     surface, record = touched(empty)
@@ -59,6 +60,7 @@ def test_a_cube_is_a_cube_with_sharp_edges(empty, extension):
     assert lengths.sum() == pytest.approx(24.0, abs=1e-3)
 
 
+@pytest.mark.long
 def test_what_the_mesh_hides_does_not_count(empty, ball):
     empty.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=8, radius=0.5)
     ball.select_set(True)
@@ -69,6 +71,7 @@ def test_what_the_mesh_hides_does_not_count(empty, ball):
     assert record["deviation_max"] < 0.01
 
 
+@pytest.mark.long
 def test_what_touches_bridge_is_reported(empty, extension, ball, touches_of):
     """A dent next to the surface, which is made after the touches, because these would feel it."""
     touches = touches_of(ball, tolerance=0.02)
@@ -106,6 +109,7 @@ def test_what_touches_bridge_is_reported(empty, extension, ball, touches_of):
     assert touches.report()["message"].endswith(f"{advice} a shorter edge length.")
 
 
+@pytest.mark.long
 def test_without_an_edge_length_the_mesh_is_that_of_the_distances(ball, touches_of):
     touches = touches_of(ball, tolerance=0.02)
     for _ in touches.steps():
@@ -166,6 +170,7 @@ def progress_of(touches):
     return words, shares
 
 
+@pytest.mark.long
 def test_touching_is_half_of_the_progress(empty, touches_of):
     empty.ops.mesh.primitive_cylinder_add(vertices=8)
     words, shares = progress_of(touches_of(empty.context.object, tolerance=0.02))
@@ -173,6 +178,7 @@ def test_touching_is_half_of_the_progress(empty, touches_of):
     assert words[-1] == "Comparing"
 
 
+@pytest.mark.long
 def test_progress_never_runs_backward(balls, touches_of):
     words, _ = progress_of(touches_of(balls, tolerance=0.02))
     again = [i for i, word in enumerate(words) if i > words.index("Joining") and word[0].isdigit()]
@@ -180,6 +186,7 @@ def test_progress_never_runs_backward(balls, touches_of):
     assert words[-1] == "Comparing"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("word", ["Joining", "Checking"])
 def test_once_stopped_it_touches_no_more(balls, touches_of, word):
     touches = touches_of(balls, tolerance=0.02)
@@ -203,6 +210,7 @@ def test_who_stops_it_gets_no_advice_to_allow_more_touches(ball, touches_of):
     assert report["message"] == f"Touching was stopped, and the object goes on at {places}: touch it again."
 
 
+@pytest.mark.long
 def test_there_is_no_tick_where_heights_are_worse_than_the_tolerance(extension, ball, touches_of):
     touches = touches_of(ball, tolerance=0.02)
     for _ in touches.steps():

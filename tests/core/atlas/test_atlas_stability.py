@@ -15,6 +15,7 @@ def explored(solid, **options):
     return core.explore_object(solid, solid.start, solid.outward, rng=0, **{"tolerance": 8e-3} | options)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rounding", [1e-13, -3e-13])
 def test_rounding_chooses_no_touch(rounding):
     """Beyond an edge two contacts are equally far from their mean, and many places bring as much."""
@@ -44,6 +45,7 @@ def plain():
     return explored(solids.ball())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("scale", "shift"), [(1e-6, (0, 0, 0)), (1e6, (0, 0, 0)), (1.0, (1e5, -2e5, 3e5)), (1e3, (1e6, 0, 1e6))]
 )
@@ -57,6 +59,7 @@ def test_no_unit_and_no_origin_matters(plain, scale, shift):
     assert np.abs(off).mean() < 2e-3
 
 
+@pytest.mark.long
 def test_noise_of_a_hundredth_leaves_a_closed_ball():
     atlas = explored(solids.ball(), tolerance=0.02, noise=0.01)
     mesh = atlas.mesh(0.15)
@@ -64,6 +67,7 @@ def test_noise_of_a_hundredth_leaves_a_closed_ball():
     assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 2, 1)
 
 
+@pytest.mark.long
 def test_a_tenth_of_outlying_contacts_is_ignored():
     solid = solids.ball()
     atlas = core.explore_object(
@@ -89,6 +93,7 @@ class BadNormals:
         return hit[0], tuple(normal / np.linalg.norm(normal))
 
 
+@pytest.mark.long
 def test_bad_normals_are_found_to_be_bad():
     solid = solids.ball()
     atlas = core.explore_object(
@@ -99,6 +104,7 @@ def test_bad_normals_are_found_to_be_bad():
     assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 2, 1)
 
 
+@pytest.mark.long
 def test_of_two_shells_the_outer_one_is_felt_and_closed():
     def distance(x, y, z):
         out = math.hypot(x, y, z)
@@ -111,6 +117,7 @@ def test_of_two_shells_the_outer_one_is_felt_and_closed():
     assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1.0).max() < 0.02
 
 
+@pytest.mark.long
 def test_both_sides_of_a_wall_stay_apart():
     solid = solids.block(1.0, 0.8, 0.05)
     atlas = explored(solid, tolerance=4e-3, most=40)
@@ -120,6 +127,7 @@ def test_both_sides_of_a_wall_stay_apart():
         assert distance == pytest.approx(np.full(200, side), abs=4e-3)
 
 
+@pytest.mark.long
 def test_two_balls_in_contact_do_not_end_the_touches_or_fill_what_is_between():
     def distance(x, y, z):
         return min(math.hypot(x + 1.0, y, z), math.hypot(x - 1.0, y, z)) - 1.0
@@ -134,6 +142,7 @@ def test_two_balls_in_contact_do_not_end_the_touches_or_fill_what_is_between():
     assert felt.max() > 1.0
 
 
+@pytest.mark.long
 def test_a_plane_without_end_takes_the_budget_and_no_more():
     solid = solids.Solid(lambda x, y, z: z, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     atlas = explored(solid, most=12)
@@ -141,6 +150,7 @@ def test_a_plane_without_end_takes_the_budget_and_no_more():
     assert atlas.status == "uncertain"
 
 
+@pytest.mark.long
 def test_a_surface_finer_than_the_tolerance_ends():
     def distance(x, y, z):
         waves = 0.02 * math.sin(60.0 * x) * math.sin(60.0 * y) * math.sin(60.0 * z)
@@ -165,6 +175,7 @@ class Inward:
         return hit and (hit[0], tuple(-n for n in hit[1]))
 
 
+@pytest.mark.long
 def test_inward_normals_tell_as_much_as_outward_ones():
     solid = solids.ball()
     found = [
@@ -176,6 +187,7 @@ def test_inward_normals_tell_as_much_as_outward_ones():
     assert found[1].status == "ok"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("most", [8, 15])
 def test_touches_again_of_uncertain_patches_count_toward_the_most(most):
     """A tolerance of little more than the noise leaves patches uncertain."""
@@ -184,6 +196,7 @@ def test_touches_again_of_uncertain_patches_count_toward_the_most(most):
     assert max(state.done for state in core.touch_all_over(ring, ring.start, ring.outward, **options)) == most
 
 
+@pytest.mark.long
 def test_vertices_lie_on_a_thin_wall():
     wall = solids.block(0.6, 0.5, 0.05)
     atlas = core.explore_object(wall, wall.start, wall.outward, tolerance=1e-2, noise=2e-4, rng=0, most=300)

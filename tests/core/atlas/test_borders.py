@@ -81,6 +81,7 @@ def apart(points, ends):
     return np.linalg.norm(points[:, None] - feet, axis=2).min(axis=1).max()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("polygon", "is_bent"), [(SQUARE, False), (ANGLE, False), (ANGLE, True)])
 def test_an_open_sheet_is_a_disc_that_ends_at_the_border_with_its_corners(polygon, is_bent):
     sheet = Sheet(polygon, turned(), is_bent)
@@ -101,6 +102,7 @@ def test_an_open_sheet_is_a_disc_that_ends_at_the_border_with_its_corners(polygo
         )
 
 
+@pytest.mark.long
 def test_beyond_the_border_the_deviation_is_infinite_and_inside_it_is_not():
     sheet = Sheet(ANGLE)
     atlas = explored(sheet, (0.2, 0.15), (0.0, 0.0, 1.0))

@@ -116,6 +116,7 @@ def test_another_sheet_nearby_does_not_count():
     assert together.mean[2 * count :][middle] == pytest.approx(-single.mean[middle], rel=0.05)
 
 
+@pytest.mark.long
 def test_curvatures_are_near_and_their_deviations_hold(touched):
     """The polynomials of the touches are off by 2.1 and .44 of K on average, on the ring and on the egg."""
     name, atlas = touched
@@ -137,6 +138,7 @@ def test_curvatures_are_near_and_their_deviations_hold(touched):
     assert sure.mean() > 0.8
 
 
+@pytest.mark.long
 def test_faces_of_a_block_are_flat_and_beside_its_edges_nothing_is_known(block):
     mesh = block.reference.mesh
     found = block.curvatures(mesh)
@@ -152,6 +154,7 @@ def test_faces_of_a_block_are_flat_and_beside_its_edges_nothing_is_known(block):
     assert np.abs(found["gaussian_curvature"]).max() < 1e-3
 
 
+@pytest.mark.long
 def test_turned_scaled_and_moved_they_are_the_same(touched):
     mesh = touched[1].reference.mesh
     turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
@@ -164,6 +167,7 @@ def test_turned_scaled_and_moved_they_are_the_same(touched):
         assert 20.0**power * again == pytest.approx(values, rel=1e-6, abs=1e-8)
 
 
+@pytest.mark.long
 def test_where_there_is_no_surface_nothing_is_known(touched, block):
     far = np.array([[5.0, 0.0, 0.0], [0.0, 0.0, -9.0], [0.7, 0.7, 0.0]])
     normals = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])

@@ -16,6 +16,7 @@ def expected(**options):
     return core.expected_touches(solids.ball(), AROUND, AROUND, 4.0 * np.pi, **options)
 
 
+@pytest.mark.long
 def test_it_is_about_as_many_as_there_are():
     ball = solids.ball()
     made = []

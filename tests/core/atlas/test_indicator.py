@@ -100,6 +100,7 @@ def charts():
     return charts_of([e.result for e in found])
 
 
+@pytest.mark.long
 def test_areas_of_overlapping_patches_add_up_to_that_of_the_surface(charts):
     samples = result_of(samples_of(charts, 0.03))
     assert samples.areas.sum() == pytest.approx(4.0 * np.pi, rel=0.03)

@@ -26,6 +26,7 @@ def raster(noise=0.0, lines=17, each=60):
     return rows
 
 
+@pytest.mark.long
 def test_a_raster_becomes_a_surface():
     atlas = core.atlas_of(raster(noise=1e-3), outward=(0, 0, 1), tolerance=4e-3, noise=1e-3)
     x, y = np.random.default_rng(1).uniform(-0.7, 0.7, (2, 200))
@@ -36,6 +37,7 @@ def test_a_raster_becomes_a_surface():
     assert (above > 0.0).mean() > 0.98
 
 
+@pytest.mark.long
 def test_steps_tell_the_share_that_is_covered_and_return_the_same():
     steps, shares = core.cover_contacts(raster(), outward=(0, 0, 1), tolerance=4e-3), []
     while True:
@@ -137,6 +139,7 @@ def test_the_two_sides_of_a_thin_plate_and_of_a_gap_contradict_nothing(thickness
         assert next(core.cover_contacts([core.Contour(points, normals=outward)])) == 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("scale", "length"), [(1e-48, 1.0), (1e49, 1.0), (1.0, 1e200), (1.0, 1e-200)])
 def test_the_unit_of_contacts_and_the_length_of_normals_change_nothing(scale, length):
     plain, other = ball_atlas().reference.mesh, ball_atlas(scale, length).reference.mesh
@@ -158,6 +161,7 @@ def cap_rows():
     ]
 
 
+@pytest.mark.long
 def test_a_cap_is_uncertain_and_nothing_is_certain_where_nothing_was_felt():
     atlas = cap_atlas()
     assert atlas.status == "uncertain"
@@ -204,6 +208,7 @@ def rings_of_ball(normals=None, gap=0.15):
     return strokes
 
 
+@pytest.mark.long
 def test_strokes_all_over_a_ball_need_no_normals_and_no_hint():
     strokes = rings_of_ball()
     for hint in (None, (0.0, 0.0, 1.0)):
@@ -227,6 +232,7 @@ def test_normals_that_contradict_each_other_are_never_ok(wrong, outward):
         core.atlas_of([core.Contour(points, normals=normals)], outward=outward)
 
 
+@pytest.mark.long
 def test_where_a_few_normals_contradict_each_other_the_surface_is_in_doubt():
     points = np.vstack(rings_of_ball())
     normals = np.where((points[:, 2] > 0.8)[:, None], second(points, None), points)
@@ -256,6 +262,7 @@ def test_an_empty_mesh_is_not_closed_and_has_edges_of_no_length():
     assert core.shortest_edge(mesh.vertices, mesh.triangles) == 0.0
 
 
+@pytest.mark.long
 def test_normals_that_contacts_have_count_and_the_others_follow_them():
     points = ball()
     half = [core.Contour(points[:400], normals=points[:400]), points[400:][points[400:, 2] > 0.5]]
@@ -273,6 +280,7 @@ def noisy_ball():
     return [ring + rng.normal(0.0, 1e-3, ring.shape) for ring in rings_of_ball(gap=0.1)]
 
 
+@pytest.mark.long
 def test_deviations_are_those_of_the_mean_of_overlapping_patches():
     atlas = core.atlas_of(noisy_ball(), noise=1e-3)
     places = ball(2000)
@@ -301,6 +309,7 @@ def test_nothing_is_outside_where_the_other_parts_close_around_it():
     assert np.isfinite(found).tolist() == [True, False, True]
 
 
+@pytest.mark.long
 def test_few_fits_find_how_large_patches_can_be(monkeypatch):
     fits = []
 
@@ -314,6 +323,7 @@ def test_few_fits_find_how_large_patches_can_be(monkeypatch):
     assert sum(fits) < measured.SOME_PLACES + 4 * len(atlas.patches)
 
 
+@pytest.mark.long
 def test_contacts_that_several_strokes_have_count_once():
     strokes = noisy_ball()
     atlas, places = core.atlas_of(strokes, noise=1e-3), ball(100)
@@ -322,6 +332,7 @@ def test_contacts_that_several_strokes_have_count_once():
         assert np.array_equal(again.distance(places), atlas.distance(places))
 
 
+@pytest.mark.long
 def test_a_ball_that_is_larger_than_its_centers_bend_is_a_doubt():
     centers = [core.Contour(ring, ball=1.4) for ring in rings_of_ball()]
     atlas = core.atlas_of(centers)

@@ -74,6 +74,7 @@ def test_edges_of_any_length_leave_the_topology_and_the_place(block, edge):
     assert mesh.edge == pytest.approx(edge, rel=0.3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("sides", "flat", "sharp"), [(4, 0.99, 0.95), (6, 0.99, 0.95), (8, 0.97, 0.9)])
 def test_walls_that_turn_by_45_degrees_or_more_are_sharp_and_take_few_touches(sides, flat, sharp):
     solid = solids.prism(sides)
@@ -92,6 +93,7 @@ def test_walls_that_turn_by_45_degrees_or_more_are_sharp_and_take_few_touches(si
     assert np.mean(np.linalg.norm(off, axis=1) < 0.5 * TOLERANCE) > sharp
 
 
+@pytest.mark.long
 def test_a_fillet_that_was_felt_stays_round():
     solid = solids.rounded(0.1)
     atlas = explored(solid)
@@ -103,6 +105,7 @@ def test_a_fillet_that_was_felt_stays_round():
     assert np.quantile(np.einsum("ni,ni->n", true, mesh.normals), 0.02) > math.cos(math.radians(10.0))
 
 
+@pytest.mark.long
 def test_edges_are_straight_to_half_a_tolerance(block):
     mesh, along = block.mesh(0.06), np.linspace(-0.95, 0.95, 200)
     for axis in range(3):
@@ -122,6 +125,7 @@ def cone():
     return core.explore_object(CONE, CONE.start, CONE.outward, tolerance=TOLERANCE, noise=5e-4, rng=1)
 
 
+@pytest.mark.long
 def test_a_tip_that_no_patch_reaches_is_where_the_planes_of_walls_meet(cone):
     tip = cone.reference.mesh.vertices[cone.reference.mesh.vertices[:, 2].argmax()]
     assert tip == pytest.approx((0.0, 0.0, 1.0), abs=TOLERANCE)
@@ -133,6 +137,7 @@ def test_a_tip_that_no_patch_reaches_is_where_the_planes_of_walls_meet(cone):
     assert np.mean(off <= 1.645 * std) > 0.85
 
 
+@pytest.mark.long
 def test_the_sharpest_places_are_checked_and_touched_again():
     cone = core.explore_object(CONE, CONE.start, CONE.outward, tolerance=TOLERANCE, noise=5e-4, rng=0)
     assert cone.status == "ok"
@@ -151,6 +156,7 @@ def test_angles_around_a_vertex_are_those_of_its_triangles(block):
     assert (2.0 * np.pi - angles).sum() == pytest.approx(4.0 * np.pi)  # Gauss and Bonnet: 2 pi times 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("edge", [0.03, 0.012, 0.008, 0.006])
 def test_what_is_closed_at_one_length_of_edges_is_so_at_another(cone, edge):
     assert cone.status == "ok"
@@ -192,6 +198,7 @@ def test_far_away_and_outside_of_the_grid_the_side_is_right(block):
     assert distance == pytest.approx(BLOCK.distances(far), rel=1e-3)
 
 
+@pytest.mark.long
 def test_a_block_is_right_and_ok_from_any_start():
     """Starts on a face near an edge, and on other faces."""
     starts = [((0.99, 0.0, 0.5), (0, 0, 1)), ((-1.0, 0.5, 0.4), (-1, 0, 0)), ((0.3, 0.7, -0.3), (0, 1, 0))]
@@ -210,6 +217,7 @@ def test_a_start_on_an_edge_or_in_a_corner_finds_a_good_place_beside_it(point):
     assert solids.topology(atlas.reference.mesh.triangles) == solids.Topology(0, 0, 2, 1)
 
 
+@pytest.mark.long
 def test_two_balls_with_a_gap_are_two_pieces_though_no_finger_slides_from_one_to_the_other():
     def distance(x, y, z):
         return min(math.hypot(x + 1.04, y, z), math.hypot(x - 1.04, y, z)) - 1.0
@@ -221,6 +229,7 @@ def test_two_balls_with_a_gap_are_two_pieces_though_no_finger_slides_from_one_to
     assert np.abs(solid.distances(atlas.reference.mesh.vertices)).max() < 1.5 * TOLERANCE
 
 
+@pytest.mark.long
 def test_half_a_shell_has_a_border_and_beyond_it_the_deviation_is_infinite():
     def sheet(origin, direction, distance):
         (x, y, z), (a, b, c) = origin, direction
@@ -266,6 +275,7 @@ def test_the_nearest_places_on_triangles_are_no_farther_than_any_of_their_places
         assert (np.linalg.norm(points - other, axis=1) >= away - 1e-9).all()
 
 
+@pytest.mark.long
 def test_where_walls_turn_smoothly_there_is_no_crease():
     """A mesh of a ball whose edges are so long that normals at their ends differ by up to 40 degrees."""
     atlas = explored(solids.ball(), rng=1)

@@ -103,6 +103,7 @@ def test_distances_are_signed_and_their_deviations_true(ball):
     assert (np.sign(distance) == np.sign(radii - 1.0))[np.abs(radii - 1.0) > 6e-3].all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "solid", "known"),
     # Around the block, most places are nearest to an edge; a third of them is enough to judge by.
@@ -137,6 +138,7 @@ def test_neighbors_agree_on_normals_and_bends_where_they_meet(ring):
     assert np.abs(bends[0] - bends[1]).mean() < 0.2 * np.ptp(bends[0])
 
 
+@pytest.mark.long
 def test_deviations_of_bends_are_true_where_patches_meet(ball, ring):
     """A torus of radii R and r has K = cos t / (r (R + r cos t))."""
     held = []
@@ -191,6 +193,7 @@ def test_edges_that_were_felt_on_both_sides_are_closed(block):
     assert solids.topology(block.mesh(0.1).triangles).open == 0
 
 
+@pytest.mark.long
 def test_progress_can_end_it_with_what_is_there():
     calls = []
 
@@ -240,6 +243,7 @@ def test_a_surface_less_certain_than_the_tolerance_is_doubted_and_touched_next_w
     assert touch.outward == pytest.approx(touch.point, abs=0.1)
 
 
+@pytest.mark.long
 def test_a_prism_of_six_sides_has_its_walls_and_creases():
     """Its sides turn by 60 degrees only, less than those of a block; blended walls would take 50 touches."""
     prism = solids.prism(6)
@@ -344,6 +348,7 @@ def test_no_start_on_the_surface_gets_a_sentence():
         core.explore_object(solids.ball(), (0.0, 0.0, 2.0), (0.0, 0.0, 1.0), tolerance=1e-2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("most", [4, 1000])
 def test_the_graph_as_data_survives_json_and_is_that_of_the_atlas(ball, most):
     atlas = ball if most == 1000 else explored(solids.ball(), most=most)
@@ -380,6 +385,7 @@ def test_edges_in_steps_are_the_edges(ring):
     assert list(again.bounding()) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("when", ["joining", "again"])
 def test_false_while_patches_are_joined_ends_the_touching(when):
     """The budget leaves a border, from which touches would go on after the join."""
@@ -397,6 +403,7 @@ def test_false_while_patches_are_joined_ends_the_touching(when):
         assert len(end.value.patches) <= state.done
 
 
+@pytest.mark.long
 def test_a_second_body_takes_no_more_touches_than_the_first():
     def distance(x, y, z):
         return math.hypot(abs(x) - 1.2, y, z) - 1.0

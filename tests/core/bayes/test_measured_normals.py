@@ -311,6 +311,7 @@ def test_right_normals_of_a_texture_are_not_doubted():
     assert max(tilts) > 0.35
 
 
+@pytest.mark.long
 def test_normals_of_a_texture_that_noise_hides_make_fits_hardly_surer_than_they_are():
     """With noise of 1 % of the radius contacts ask for no process, and a sextic does not follow the waves."""
     off, step = [], 1e-5

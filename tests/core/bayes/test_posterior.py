@@ -107,6 +107,7 @@ def test_noise_averages_out_and_the_frame_is_better_than_the_papers():
     assert np.median(worst["bayes"]) < 0.4 * np.median(worst["tagc"])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("planes", [THREE, surfaces.planes((13, 48, 93))], ids=["even", "uneven"])
 def test_intervals_cover_surfaces_drawn_from_the_prior(planes):
     """90 % intervals of height_std, over 60 surfaces with every term to degree 6."""

@@ -160,6 +160,7 @@ def heights_missed(r):
     return r.patch.height(x, y) - z
 
 
+@pytest.mark.long
 def test_on_a_cylinder_the_descent_crawls_and_a_step_cap_is_said(monkeypatch):
     """K = 0 all over: every grid point is a kink of |K| that the descent zigzags across, 15000 steps here."""
     s = surfaces.cylinder(20)

@@ -133,6 +133,7 @@ def test_a_similarity_scales_the_ball():
     assert moved.ball == 2.0 * BALL
 
 
+@pytest.mark.long
 def test_a_whole_object_of_centers_has_the_size_of_the_contacts():
     strokes = []
     for z in np.arange(-0.95, 1.0, 0.15):

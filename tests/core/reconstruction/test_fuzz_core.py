@@ -350,6 +350,7 @@ def test_a_touch_with_one_thing_broken(touch):
         examine(r)
 
 
+@pytest.mark.long
 @given(touches())
 @in_time
 def test_many_touches_with_one_of_them_broken(touch):
@@ -406,6 +407,7 @@ def test_where_arbitrary_curves_meet(curves):
         assert all(np.isfinite(values).all() for values in found)
 
 
+@pytest.mark.long
 @given(st.integers(0, 8), st.integers(0, 3), st.data())
 @in_time
 def test_arbitrary_measured_normals(shape, planes, data):
@@ -461,6 +463,7 @@ class OddSurface:
         return self.data.draw(self.hits(tuple(map(float, point)), tuple(map(float, normal))))
 
 
+@pytest.mark.long
 @given(
     st.data(),
     st.integers(0, len(SHAPES) - 1),

@@ -382,6 +382,7 @@ def test_an_outward_direction_that_the_surface_turns_away_from_is_refused():
     np.testing.assert_allclose(r.frame.axes[:, 2], ends)
 
 
+@pytest.mark.long
 def test_no_numbers_but_finite_ones_come_out_of_random_curves():
     rng = np.random.default_rng(6)
     for _ in range(200):

@@ -116,6 +116,7 @@ def split(a, b, c):
     return (a, d, f), (d, b, e), (f, e, c), (d, e, f)
 
 
+@pytest.mark.long
 def test_the_curvature_of_a_ball_is_right_or_said_to_be_that_of_facets():
     """A ball of 320 triangles: more than a dozen of them are felt, and curvatures are off by up to .9."""
     ball, rng = icosphere(3), np.random.default_rng(0)

@@ -168,6 +168,7 @@ def test_a_mirror_image_is_no_place():
     assert register(r, vertices * [-1, 1, 1], faces[:, ::-1])[0].residual > 5.0 * bumpy_poses()[0].residual
 
 
+@pytest.mark.long
 def test_a_pose_turns_moves_and_scales_with_the_mesh():
     surface, vertices, faces = bumpy()
     first = bumpy_poses()[0]
@@ -186,6 +187,7 @@ def test_a_pose_turns_moves_and_scales_with_the_mesh():
     assert angle < 0.2
 
 
+@pytest.mark.long
 def test_of_two_walls_the_normals_choose():
     """A shell of 1 mm, whose inner wall has the shape of the outer one."""
     surface, vertices, faces = bumpy()
@@ -199,6 +201,7 @@ def test_of_two_walls_the_normals_choose():
         assert pose.vertex == 1234 + (len(vertices) if side < 0 else 0)
 
 
+@pytest.mark.long
 def test_noise_moves_a_pose_by_no_more_than_itself():
     surface, vertices, faces = bumpy()
     r = touch(surface, noise=0.1, step=0.8)
