@@ -180,6 +180,7 @@ def test_where_there_is_no_surface_nothing_is_known(touched, block):
     assert np.isinf(curvatures_of(sheet, beyond, np.tile([0.0, 0.0, 1.0], (50, 1))).gauss_std).all()
 
 
+@pytest.mark.long
 def test_none_and_many_points_at_once_are_as_each(touched):
     mesh, atlas = touched[1].reference.mesh, replace(touched[1])
     normals = mesh.normals
