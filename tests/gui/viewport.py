@@ -474,22 +474,26 @@ def grab_from_near():
         yield 1
         picture(f"near_{number}")
         for plane in range(3):
-            at, azimuth = gui.view_point(places[plane]), owner.tactile_probe.azimuths[plane]
+            at = gui.view_point(places[plane])
             covered = [r.type for r in area.regions if r.type != "WINDOW" and is_over(r, at, 8)]
-            inside = is_over(region, at, -8)
-            check(
-                f"view {number}: disc {plane + 1} is in the free view", inside and not covered, (at, covered)
-            )
-            center = gui.view_point(owner.matrix_world.translation)
-            arm = [a - b for a, b in zip(at, center, strict=True)]
-            gui.drag(at, (at[0] - 0.2 * arm[1], at[1] + 0.2 * arm[0]))
-            yield 1
-            turned = owner.tactile_probe.azimuths[plane] - azimuth
-            check("... and turns its plane", 0.05 < abs(turned) < 0.5, turned)
-            yield from until(is_complete)
+            good = is_over(region, at, -8) and not covered
+            check(f"view {number}: disc {plane + 1} is in the free view", good, (at, covered))
+            yield from turn_at(owner, plane, at)
     group.draw_prepare = prepare
     gui.click(*DELETE_BUTTON)
     yield 1
+
+
+def turn_at(owner, plane, at):
+    """Drags the handle of a plane that is at a place of the window."""
+    azimuth = owner.tactile_probe.azimuths[plane]
+    center = gui.view_point(owner.matrix_world.translation)
+    arm = [a - b for a, b in zip(at, center, strict=True)]
+    gui.drag(at, (at[0] - 0.2 * arm[1], at[1] + 0.2 * arm[0]))
+    yield 1
+    yield from until(is_complete)
+    turned = abs(owner.tactile_probe.azimuths[plane] - azimuth)
+    check("... and turns its plane", 0.05 < turned < 0.5, turned)
 
 
 def is_over(region, at, margin):

@@ -193,6 +193,18 @@ def test_once_stopped_it_touches_no_more(balls, touches_of, word):
     assert len(touches.found) == len(touches.whole.atlas.patches)
 
 
+def test_once_stopped_it_says_that_it_joins(ball, touches_of):
+    """Also while the touches end that were under way."""
+    touches, words = touches_of(ball, tolerance=0.02), []
+    for _ in touches.steps():
+        if touches.is_stopped:
+            words.append(touches.words)
+        elif len(touches.found) >= 3:
+            touches.stop()
+    assert words[0].startswith("Joining ")
+    assert not any(each[0].isdigit() for each in words)
+
+
 def test_who_stops_it_gets_no_advice_to_allow_more_touches(ball, touches_of):
     touches = touches_of(ball, tolerance=0.02)
     for _ in touches.steps():
