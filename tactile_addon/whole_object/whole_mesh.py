@@ -26,7 +26,7 @@ SHARP = math.radians(30.0)  # Edges at which faces are turned by more are crease
 RINGS, SPOKES = (0.3, 0.65, 0.95, 1.0), 48
 RIM_COLOR = (0.02, 0.02, 0.02, 1.0)
 DRAWN_ABOVE = 5e-3  # It is drawn this share of the object's size above the mesh, in which it would lie,
-LAYER = 1e-3  # and above patches that it overlaps by this share, as two in one place flicker.
+LAYER, LAYERS = 1e-3, 10  # and above patches that it overlaps by this share, up to so many times.
 
 
 class GrowingPatches:
@@ -64,11 +64,11 @@ class GrowingPatches:
         fill(obj.data, points, triangles, [(COLOR, shades)])
 
     def _layer(self, frame: core.Frame, reach: float) -> int:
-        """The lowest layer that no patch has which one with this frame and reach overlaps."""
+        """The lowest free layer for a patch with this frame and reach, as overlapping ones in one flicker."""
         normal, (others, ups) = frame.axes[:, 2], np.hsplit(self._placed[:, :6], 2)
         near = np.linalg.norm(others - frame.origin, axis=1) < self._placed[:, 6] + reach
         taken = self._placed[near & (ups @ normal > ALIKE), 7]
-        layer = next(number for number in range(len(taken) + 1) if number not in taken)
+        layer = next((number for number in range(LAYERS) if number not in taken), len(taken) % LAYERS)
         self._placed = np.vstack([self._placed, [*frame.origin, *normal, reach, layer]])
         return layer
 
