@@ -231,10 +231,10 @@ class _Run:
     def going_on(self, contacts: Sequence[PointNormal], farthest: float) -> Generator[Progress, object, None]:
         """Touches at contacts, and all over from there."""
         few = contacts[: self.most - self.done]
-        new: list[Exploration] = []
-        if few:
-            new = yield from self.showing(self.touching(few, farthest, [NARROW] * len(few)))
-        yield from self.show(self.now(new=new))
+        while few and not self.is_stopped:
+            some, few = few[:SIDE_BY_SIDE], few[SIDE_BY_SIDE:]
+            new = yield from self.showing(self.touching(some, farthest, [NARROW] * len(some)))
+            yield from self.show(self.now(new=new))
         yield from _all_over(self)
 
     def check(self, reference: ReferenceMesh) -> Generator[float, None, Check]:

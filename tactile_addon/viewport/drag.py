@@ -72,9 +72,12 @@ class TACTILE_OT_drag(bpy.types.Operator):
         # The handle follows the mouse from here on. Where the button went down is not known, because a busy
         # Blender hears of it late, when the mouse is already elsewhere.
         self._before = self._value = self._free = self._last = self._get(context)
-        if self.what != POINT and self._below(context, event) is None:
+        below = None if self.what == POINT else self._below(context, event)
+        if self.what != POINT and below is None:
             self.report({"WARNING"}, "The plane is seen edge on: turn the view to drag this handle")
             return {"CANCELLED"}
+        if self.what in (DRAG_TURN, DRAG_TILT) and math.cos(below - self._before) < 0.0:
+            self._last += math.pi  # The handle is at the other end.
         context.workspace.status_text_set(lambda header, _: draw_hints(header.layout, HINTS))
         context.window_manager.modal_handler_add(self)
         self._say(context)

@@ -6,17 +6,20 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import bpy
-import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Matrix, Vector
 
 from ..probes import probe
 from ..touch.touch_object import plane_axes
 from .drag import DRAG_EXTENT, DRAG_TILT, DRAG_TURN, POINT, STEEP, shown_probe
+from .free_view import is_free
 from .overlay import PLANE_COLORS
 
 HANDLE_REACH = 1.15  # Handles that turn planes are this many extents away from the point,
-UPRIGHT = 0.75  # and those that tilt planes this many extents above it.
+UPRIGHT = 0.75  # and those that tilt planes this many extents above it,
+# or at the first of these multiples where the view is free: at the other end, or nearer.
+ENDS = [sign * share / 10.0 for share in range(10, 1, -1) for sign in (1.0, -1.0)]
+MARGIN = 10.0  # It is free where this many pixels at scale 1 around a handle are.
 BALL, LEAST_BALL = 0.12, 0.05  # Sizes of balls, in units of Blender's gizmo size.
 SHARE = 0.125  # A ball is no larger than this share of the patch in the view.
 APART = 24.0  # Handles that are nearer to the point in the view than this many pixels at scale 1 are hidden.
@@ -44,6 +47,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         self.point.select_bias = NEAREST
         self.turns = [self._ball(DRAG_TURN, i, color) for i, color in enumerate(PLANE_COLORS)]
         self.tilts = [self._ball(DRAG_TILT, i, color) for i, color in enumerate(PLANE_COLORS)]
+        self.ends = dict.fromkeys((*self.turns, *self.tilts), 1.0)
 
     def _ball(self, what: str, plane: int, color: Sequence[float]) -> Any:
         ball = self._handle("GIZMO_GT_move_3d", what, plane, color)
@@ -67,37 +71,39 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         obj = shown_probe(context)
         settings, matrix = obj.tactile_probe, obj.matrix_world
         reach = settings.extent or probe.record_of(obj)["extent"]
-        center = np.array(matrix.translation, dtype=float)
-        apart = self._shrink(context, matrix.translation, reach)
+        center = matrix.translation
+        apart = self._shrink(context, center, reach)
         active = min(settings.active_plane, settings.plane_count - 1)
-        self.point.matrix_basis = Matrix.Translation(center.tolist())
+        self.point.matrix_basis = Matrix.Translation(center)
         self.point.hide = settings.target is None
-        ahead = _line_of_sight(context.region_data, matrix.translation)
+        ahead = _line_of_sight(context.region_data, center)
         for i, (turn, tilt) in enumerate(zip(self.turns, self.tilts, strict=True)):
             turn.hide, tilt.hide = i >= settings.plane_count, i != active
             if not turn.hide:
-                t, up, _ = plane_axes(matrix, settings, i).T
+                t, up, _ = (Vector(axis) for axis in plane_axes(matrix, settings, i).T.tolist())
                 # If the tilt's plane is seen edge on, a little way of the mouse turns it by much.
-                tilt.hide = tilt.hide or abs(ahead.dot(Vector(t))) < STEEP
-                turn.matrix_basis = Matrix.Translation(center + HANDLE_REACH * reach * t)
-                tilt.matrix_basis = Matrix.Translation(center + UPRIGHT * reach * up)
-                turn.hide, tilt.hide = (
-                    each.hide or not apart(each.matrix_basis.translation) for each in (turn, tilt)
-                )
-        self.extent.hide = not apart(matrix.translation + reach * _right(context))
-        self.extent.matrix_basis = Matrix.LocRotScale(matrix.translation, matrix.to_quaternion(), [reach] * 3)
+                tilt.hide = tilt.hide or abs(ahead.dot(t)) < STEEP
+                for each, arm in ((turn, HANDLE_REACH * reach * t), (tilt, UPRIGHT * reach * up)):
+                    self._put(context, each, center, arm)
+                    each.hide = each.hide or not apart(each.matrix_basis.translation)
+        self.extent.hide = not apart(center + reach * _right(context))
+        self.extent.matrix_basis = Matrix.LocRotScale(center, matrix.to_quaternion(), [reach] * 3)
+
+    def _put(self, context: bpy.types.Context, handle: Any, center: Vector, arm: Vector) -> None:
+        """Puts a handle at the first end where the view is free, or if there is none, at the first one."""
+        if not handle.is_modal:  # One that is dragged stays at its end.
+            margin = MARGIN * context.preferences.system.ui_scale
+            free = (end for end in ENDS if is_free(context, _seen(context, center + end * arm), margin))
+            self.ends[handle] = next(free, ENDS[0])
+        place: Any = center + self.ends[handle] * arm
+        handle.matrix_basis = Matrix.Translation(place)
 
     def _shrink(self, context: bpy.types.Context, center: Vector, reach: float) -> Callable[[Vector], bool]:
         """Makes the balls smaller if the patch is small in the view, so that they do not hide it.
 
         Returns a function that is true where a place is apart from the center in the view.
         """
-
-        def seen(place: Vector) -> Any:
-            """Where a place is in the region, or None."""
-            return location_3d_to_region_2d(context.region, context.region_data, place)
-
-        here, there = seen(center), seen(center + reach * _right(context))
+        here, there = _seen(context, center), _seen(context, center + reach * _right(context))
         if here is None or there is None:
             return lambda place: True
         ui_scale = context.preferences.system.ui_scale
@@ -107,10 +113,15 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
             ball.scale_basis = scale
 
         def is_apart(place: Vector) -> bool:
-            at = seen(place)
+            at = _seen(context, place)
             return at is None or (at - here).length >= APART * ui_scale
 
         return is_apart
+
+
+def _seen(context: bpy.types.Context, place: Vector) -> Any:
+    """Where a place of the world is in the region, or None if it is behind the eye."""
+    return location_3d_to_region_2d(context.region, context.region_data, place)
 
 
 def _right(context: bpy.types.Context) -> Vector:

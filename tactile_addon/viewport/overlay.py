@@ -21,6 +21,7 @@ from ..stability_map import map_object
 from ..touch import units
 from ..touch.touch_object import Touched, plane_axes
 from ..touch.types import Array, Object
+from .free_view import free_strip
 
 # Each sampling plane has one of Okabe and Ito's colors, which color-blind readers can tell apart.
 PLANE_COLORS = [
@@ -31,8 +32,8 @@ WHITE, DARK = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.6)
 FONT = 0  # This is Blender's own font.
 LEGEND_STEPS = 65  # The number of colors of the legend's bar.
 LETTERS, OFFSET = 48, 16  # The letters in a line of words near the mouse, and the pixels between them.
-# Width and height of the legend's bar and of Blender's navigation buttons, in pixels at resolution scale 1.
-BAR, NAVIGATION_GIZMO = (150, 12), (50, 290)
+BAR = (150, 12)  # Width and height of the legend's bar, in pixels at resolution scale 1,
+BESIDE = 195  # and the width that it needs beside the last operator's panel.
 
 
 def preview_lines(touched: Touched) -> list[tuple[Array, tuple[float, ...]]]:
@@ -76,7 +77,7 @@ def _draw_words(context: bpy.types.Context, lines: Sequence[str], mouse: Sequenc
     gap, line = 6.0 * scale, blf.dimensions(FONT, "0")[1]
     wide = max(blf.dimensions(FONT, text)[0] for text in lines) + 2.0 * gap
     high = len(lines) * (line + gap) + gap
-    left, right, bottom = _free_strip(context, high)
+    left, right, bottom = free_strip(context, high, BESIDE * scale)
     x = max(min(x + OFFSET * scale, right - gap - wide), left)
     y = min(max(y - OFFSET * scale - high, bottom), region.height - high)
     _fill_box(x, y, wide, high, (*theme.inner[:3], 0.9))
@@ -200,7 +201,7 @@ def _draw_box(
     gap, line = 6.0 * scale, blf.dimensions(FONT, "0")[1]
     bar = BAR[1] * scale + line + 2.0 * gap if labels else 0.0
     high = line + 2.0 * gap + bar + len(swatches) * (line + gap)
-    left, right, bottom = _free_strip(context, high + gap)
+    left, right, bottom = free_strip(context, high + gap, BESIDE * scale)
     lengths = [blf.dimensions(FONT, title)[0]]
     lengths += [blf.dimensions(FONT, text)[0] + 2.0 * line + gap for text, _ in swatches]
     wide = min(max(BAR[0] * scale, *lengths) + 4.0 * gap, right - left - gap)
@@ -253,30 +254,6 @@ def _fill(points: Sequence[Sequence[float]], shades: Sequence[Sequence[float]]) 
     gpu.state.blend_set("ALPHA")
     batch_for_shader(shader, "TRI_STRIP", {"pos": points, "color": shades}).draw(shader)
     gpu.state.blend_set("NONE")
-
-
-def _free_strip(context: bpy.types.Context, high: float) -> tuple[float, float, float]:
-    """(left, right, bottom) of the lowest strip of this height that no sidebar, shelf or button covers."""
-    region, scale = context.region, context.preferences.system.ui_scale
-    left, right, bottom = 0.0, float(region.width), 0.0
-    hud = 0.0
-    for other in context.area.regions:
-        if other.type == "WINDOW" or min(other.width, other.height) <= 1:
-            continue
-        x, y = other.x - region.x, other.y - region.y
-        if other.type == "HUD":
-            hud, hud_top = x + other.width, y + other.height
-        elif other.alignment == "LEFT":
-            left = max(left, x + other.width)
-        elif other.alignment == "RIGHT":
-            right = min(right, x)
-        elif other.alignment == "BOTTOM":
-            bottom = max(bottom, y + other.height)
-    if region.height - NAVIGATION_GIZMO[1] * scale < bottom + high:
-        right -= NAVIGATION_GIZMO[0] * scale
-    if hud and right - 1.3 * BAR[0] * scale < hud:
-        bottom = max(bottom, hud_top)
-    return left, right, bottom
 
 
 # Functions that draw and when they do so: those that are always there, and those of a pick. The latter get a

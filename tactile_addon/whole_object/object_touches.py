@@ -168,14 +168,15 @@ class ObjectTouches:
             self._left = self._left[~covered]
         self.done, self.uncovered = state.done, state.uncovered
         touches, places = many(state.done, "touch", "touches"), many(state.uncovered, "place", "places")
-        self.words = f"{touches}, {places} to go on from"
+        patches = many(len(self.found), "patch", "patches")
         if state.joining is None:
             self._is_joining = False
+            # The last touches may still end when it is stopped.
+            self.words = f"Joining {patches}" if self.is_stopped else f"{touches}, {places} to go on from"
             self.share = max(self.share, TOUCHED * (1.0 - len(self._left) / PLACES))
             return
         self._rounds += not self._is_joining
         self._is_joining = True
-        patches = many(len(self.found), "patch", "patches")
         self.words = f"Joining {patches}" if state.joining < 1.0 else f"Checking the surface of {patches}"
         # Nobody knows how often it goes back to touching. Each round has half of what is left.
         left = 0.5**self._rounds

@@ -15,7 +15,7 @@ from ... import core
 from ..scene import colors, patch_object, patch_record, undo
 from ..scene.attributes import COLOR, DEVIATION, HEIGHT_STD, NODE
 from ..scene.mesh_data import ABOVE, emission, fill, own_mesh
-from ..scene.shown import recolor, settle_on
+from ..scene.shown import ALIKE, recolor, settle_on
 from ..scene.viewports import show_colors, show_size
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Array, Object
@@ -25,7 +25,8 @@ SHARP = math.radians(30.0)  # Edges at which faces are turned by more are crease
 # While a patch is one of many, it is drawn with these rings, the last of which is its dark rim, and spokes.
 RINGS, SPOKES = (0.3, 0.65, 0.95, 1.0), 48
 RIM_COLOR = (0.02, 0.02, 0.02, 1.0)
-DRAWN_ABOVE = 5e-3  # It is drawn this share of the object's size above the mesh, in which it would lie.
+DRAWN_ABOVE = 5e-3  # It is drawn this share of the object's size above the mesh, in which it would lie,
+LAYER, LAYERS = 1e-3, 10  # and above patches that it overlaps by this share, up to so many times.
 
 
 class GrowingPatches:
@@ -42,7 +43,8 @@ class GrowingPatches:
             undo.note_added(obj)
         obj.data.materials.append(emission("Tactile Surface", attribute=COLOR))
         self._patches: list[tuple[Array, Array]] = []
-        self._uid, self._above = obj.session_uid, DRAWN_ABOVE * surface.size
+        self._uid, self._size = obj.session_uid, surface.size
+        self._placed = np.zeros((0, 8))  # The origin, normal, reach and layer of each patch.
         show_colors()
         show_size(surface.size)
 
@@ -51,13 +53,24 @@ class GrowingPatches:
         obj = self._object()
         if obj is None or not found:
             return
-        self._patches += [_disk(r, rim, self._above) for r, rim in zip(found, rims, strict=True)]
+        for r, rim in zip(found, rims, strict=True):
+            above = DRAWN_ABOVE + LAYER * self._layer(r.frame, rim.max())
+            self._patches.append(_disk(r, rim, above * self._size))
         points, curvatures = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
         count = 1 + SPOKES * len(RINGS)
         triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
         shades = colors.diverging(curvatures, colors.symmetric_range(curvatures, 1e-30))
         shades.reshape(-1, count, 4)[:, -SPOKES:] = RIM_COLOR
         fill(obj.data, points, triangles, [(COLOR, shades)])
+
+    def _layer(self, frame: core.Frame, reach: float) -> int:
+        """The lowest free layer for a patch with this frame and reach, as overlapping ones in one flicker."""
+        normal, (others, ups) = frame.axes[:, 2], np.hsplit(self._placed[:, :6], 2)
+        near = np.linalg.norm(others - frame.origin, axis=1) < self._placed[:, 6] + reach
+        taken = self._placed[near & (ups @ normal > ALIKE), 7]
+        layer = next((number for number in range(LAYERS) if number not in taken), len(taken) % LAYERS)
+        self._placed = np.vstack([self._placed, [*frame.origin, *normal, reach, layer]])
+        return layer
 
     def remove(self) -> None:
         """Deletes the object, if it is still there."""

@@ -254,6 +254,7 @@ def reopened(before):
     yield from hide_and_delete_target("Suzanne")
     yield from edit_mode("Suzanne")
     yield from delete_by_keys()
+    yield from grab_from_near()
     yield from orthographic_and_tiny()
     yield from looks()
 
@@ -449,6 +450,56 @@ def rendering():
     probe().update_tag()
     yield 1
     check("... but after it", settings.digest != digest and not settings.message, settings.message)
+
+
+def grab_from_near():
+    """A cube so near that discs on the rim are out of view, below the sidebar or Blender's navigation."""
+    for obj in bpy.data.objects:
+        obj.hide_set(True)
+    bpy.ops.mesh.primitive_cube_add(location=(0, 0, 0))
+    bpy.ops.tactile.pick(target="Cube", location=(0, -1, 0), new=True)
+    owner, groups = bpy.context.object, bpy.types.GizmoGroup.__subclasses__()
+    group = next(group for group in groups if group.__name__ == "TACTILE_GGT_handles")
+    places, prepare = [], group.draw_prepare
+
+    def noted(self, context):
+        prepare(self, context)
+        places[:] = [turn.matrix_basis.translation.copy() for turn in self.turns]
+
+    group.draw_prepare = noted
+    _, area, region = gui.find()
+    for number, (aside, way) in enumerate((((0, 0, 0), (0.2, -1, 0.3)), ((-0.2, 0, 0.15), (0, -1, 0)))):
+        look(owner.matrix_world.translation + Vector(aside), way, 0.9 * extent(owner))
+        area.tag_redraw()
+        yield 1
+        picture(f"near_{number}")
+        for plane in range(3):
+            at = gui.view_point(places[plane])
+            covered = [r.type for r in area.regions if r.type != "WINDOW" and is_over(r, at, 8)]
+            good = is_over(region, at, -8) and not covered
+            check(f"view {number}: disc {plane + 1} is in the free view", good, (at, covered))
+            yield from turn_at(owner, plane, at)
+    group.draw_prepare = prepare
+    gui.click(*DELETE_BUTTON)
+    yield 1
+
+
+def turn_at(owner, plane, at):
+    """Drags the handle of a plane that is at a place of the window."""
+    azimuth = owner.tactile_probe.azimuths[plane]
+    center = gui.view_point(owner.matrix_world.translation)
+    arm = [a - b for a, b in zip(at, center, strict=True)]
+    gui.drag(at, (at[0] - 0.2 * arm[1], at[1] + 0.2 * arm[0]))
+    yield 1
+    yield from until(is_complete)
+    turned = abs(owner.tactile_probe.azimuths[plane] - azimuth)
+    check("... and turns its plane", 0.05 < turned < 0.5, turned)
+
+
+def is_over(region, at, margin):
+    """Whether a place as in view_point is in a region, or nearer than a margin to it."""
+    x, y = at[0] - region.x, bpy.context.window.height - at[1] - region.y
+    return -margin <= x <= region.width + margin and -margin <= y <= region.height + margin
 
 
 def looks():

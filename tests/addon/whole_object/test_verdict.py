@@ -60,6 +60,28 @@ def test_a_cube_is_a_cube_with_sharp_edges(empty, extension):
     assert lengths.sum() == pytest.approx(24.0, abs=1e-3)
 
 
+def test_growing_patches_are_above_the_mesh_and_each_other(empty, extension, touches_of):
+    """In the plane of a face, patches would be hidden by it, and by each other."""
+    empty.ops.mesh.primitive_cube_add()
+    touches = touches_of(empty.context.object, tolerance=2e-3)
+    growing = extension.tactile_addon.whole_object.whole_mesh.GrowingPatches(
+        empty.context.scene, touches.surface
+    )
+    shown = 0
+    for _ in touches.steps():
+        growing.add(touches.found[shown:], touches.rims[shown:])
+        shown = len(touches.found)
+    points = positions(empty.data.objects["Cube Touches"].data).reshape(shown, -1, 3)
+    faces = [np.argmax(r.frame.axes[:, 2] @ np.vstack([np.eye(3), -np.eye(3)]).T) for r in touches.found]
+    above = np.abs(points[:, 0]).max(axis=1) - 1.0
+    growing.remove()
+    assert above.min() > 5e-3
+    assert shown > len(set(faces))
+    for face in set(faces):
+        heights = np.sort(above[np.array(faces) == face])
+        assert (np.diff(heights) > 1e-3).all()
+
+
 @pytest.mark.long
 def test_what_the_mesh_hides_does_not_count(empty, ball):
     empty.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=8, radius=0.5)
@@ -198,6 +220,19 @@ def test_once_stopped_it_touches_no_more(balls, touches_of, word):
     assert done is not None
     assert touches.done == done
     assert len(touches.found) == len(touches.whole.atlas.patches)
+
+
+def test_once_stopped_it_says_that_it_joins(ball, touches_of):
+    """Also while the touches end that were under way."""
+    touches, words, waited = touches_of(ball, tolerance=0.02), [], 0
+    for _ in touches.steps():
+        if touches.is_stopped:
+            words.append(touches.words)
+        waited += touches.done == 1
+        if waited == 3:  # The second touch is under way.
+            touches.stop()
+    assert words[0].startswith("Joining ")
+    assert not any(each[0].isdigit() for each in words)
 
 
 def test_who_stops_it_gets_no_advice_to_allow_more_touches(ball, touches_of):

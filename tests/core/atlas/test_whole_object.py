@@ -12,6 +12,7 @@ import pytest
 import core
 from core.atlas.boundaries import gaussian_curvature_of
 from core.atlas.object_atlas import Check
+from core.atlas.touching import SIDE_BY_SIDE
 from core.steps import result_of
 from tests import solids
 
@@ -401,6 +402,26 @@ def test_false_while_patches_are_joined_ends_the_touching(when):
     except StopIteration as end:
         assert state.done == early
         assert len(end.value.patches) <= state.done
+
+
+def test_false_while_a_check_is_followed_up_ends_the_touching_soon():
+    """The check finds many other balls at once."""
+
+    def distance(*point):
+        return math.hypot(*(v - 3.0 * max(min(round(v / 3.0), 1), -1) for v in point)) - 1.0
+
+    solid = solids.Solid(distance, (1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    steps = core.touch_all_over(solid, solid.start, solid.outward, tolerance=0.05, rng=0)
+    state, joined, done = next(steps), False, None
+    try:
+        while True:
+            joined = joined or state.joining is not None
+            if joined and state.joining is None and done is None:
+                done = state.done
+            state = steps.send(None if done is None else False)
+    except StopIteration:
+        assert done is not None
+        assert state.done - done <= SIDE_BY_SIDE
 
 
 @pytest.mark.long
