@@ -10,6 +10,7 @@ import numpy as np
 from bpy.props import StringProperty
 
 from ... import core
+from ...core.arguments import many
 from ...core.steps import result_of
 from ..probes import probe, touch_again
 from ..probes.change_handlers import is_pending
@@ -154,8 +155,8 @@ class TACTILE_OT_verify(InSlices, bpy.types.Operator):
 
     def _done(self) -> Progress:
         done, count = self._verification.done, self._verification.count
-        share = done / count if count else None
-        return f'Comparing with "{self._verification.target}": {done} of {count} vertices', share
+        share, vertices = done / count if count else None, many(count, "vertex", "vertices")
+        return f'Comparing with "{self._verification.target}": {done} of {vertices}', share
 
     def _finish(self, context: bpy.types.Context) -> Outcome:
         record = self._verification.write()

@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 from bpy.props import IntProperty
 
+from ...core.arguments import many
 from ..scene import color_range, patch_object, patch_record
 from ..scene.viewports import show_colors, shows_colors
 from ..touch import units
@@ -224,7 +225,7 @@ class TACTILE_OT_share_range(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> Outcome:
         patch = probe.patch_near(context.view_layer.objects.active)
         count = color_range.share(patch, context.view_layer.objects)
-        self.report({"INFO"}, f"{count} patches have one range of colors")
+        self.report({"INFO"}, f"One range of colors for {many(count, 'patch', 'patches')}")
         return {"FINISHED"}
 
 

@@ -4,6 +4,7 @@
 
 import bpy
 
+from ...core.arguments import many
 from ..probes import probe
 from ..probes.in_slices import InSlices, Progress
 from ..probes.number_fields import dragged
@@ -78,7 +79,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
 
     def _done(self) -> Progress:
         done, count = self._map.done, len(self._map.places)
-        return f"Stability Map: {done} of {count} points", done / max(count, 1)
+        return f"Stability Map: {done} of {many(count, 'point', 'points')}", done / max(count, 1)
 
     def _check(self, context: bpy.types.Context) -> None:
         self._map.surface.require_source(context)
@@ -99,7 +100,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
             count = expected_count(target, depsgraph, self.extent, self.spacing)
         except ValueError as error:
             return sentence(error)
-        return f"{target.name}: about {count} points are touched"
+        return f"{target.name}: about {many(count, 'touch', 'touches')}"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -127,7 +127,7 @@ def ends(contours: Sequence[core.Contour], has_extent: bool) -> str:
     if not counts:
         return ""
     (first, most), *others = counts.most_common()
-    words = [f"{most} of {2 * len(contours)} half curves end {core.WHERE[first]}"]
+    words = [f"{most} of {2 * len(contours)} half curves ended {core.WHERE[first]}"]
     words += [f"{count} {core.WHERE[stop]}" for stop, count in others]
     return f" {', '.join(words)}{', before the extent' if has_extent else ''}."
 

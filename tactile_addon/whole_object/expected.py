@@ -9,10 +9,10 @@ import bpy
 import numpy as np
 
 from ... import core
+from ...core.arguments import many
 from ..touch import units
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Object
-from ..touch.wording import many
 from .object_report import LEAST_NUMBER
 from .object_touches import tolerance_of
 

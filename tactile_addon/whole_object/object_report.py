@@ -8,9 +8,10 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ...core.arguments import many
 from ..touch import units
 from ..touch.units import Unit
-from ..touch.wording import many, vector
+from ..touch.wording import vector
 
 LEAST_NUMBER = 10.0  # Lengths are in a unit that suits this many tolerances.
 ZERO = 1e-6  # A distance below this share of the size counts as 0.
@@ -24,11 +25,12 @@ def unit_of(record: Mapping[str, Any]) -> Unit:
 def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(label, value) of everything there is to say of a whole object."""
     unit, off = unit_of(record), deviation(record, "mean")
-    how = (
-        many(record["touches"], "time", "times") if "touches" in record else f"{record['contacts']} contacts"
-    )
+    was_touched = "touches" in record
+    how = many(record["touches"], "time", "times") if was_touched else _contacts(record)
+    vertices = many(record["vertices"], "vertex", "vertices")
+    triangles = many(record["triangles"], "triangle", "triangles")
     return _known(
-        ("touched" if "touches" in record else "measured", f"{record['source']}, {how}"),
+        ("touched" if was_touched else "measured", f"{record['source']}, {how}"),
         ("verdict", verdict_of(record)),
         ("surface", _surface(record)),
         ("message", record["message"]),
@@ -38,10 +40,7 @@ def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("standard deviation of the height", units.say(record["height_std"], 1, unit)),
         ("distance from the mesh", off and f"mean {off}; largest {deviation(record, 'max')}"),
         ("largest distance at", _place(record)),
-        (
-            "surface's mesh",
-            f"{record['vertices']} vertices, {record['triangles']} triangles, edges {_edge(record)}",
-        ),
+        ("surface's mesh", f"{vertices}, {triangles}, edges {_edge(record)}"),
         ("curvatures", _unknown(record)),
     )
 
@@ -64,7 +63,7 @@ def object_summary(record: Mapping[str, Any]) -> str:
     if "touches" in record:
         touches, off = many(record["touches"], "touch", "touches"), deviation(record, "mean")
         return f"{verdict_of(record)}: {touches}; {_surface(record)}; {off} off the mesh on average"
-    patches = f"{record['patches']} patches of {record['contacts']} contacts"
+    patches = f"{many(record['patches'], 'patch', 'patches')} of {_contacts(record)}"
     return f"{verdict_of(record)}: {patches}; {_surface(record)}; ± {std}"
 
 
@@ -89,6 +88,10 @@ def object_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
 def _known(*rows: tuple[str, Any]) -> list[tuple[str, str]]:
     """The rows whose value is not None, in words."""
     return [(label, str(value)) for label, value in rows if value is not None]
+
+
+def _contacts(record: Mapping[str, Any]) -> str:
+    return many(record["contacts"], "contact", "contacts")
 
 
 def _surface(record: Mapping[str, Any]) -> str:

@@ -11,11 +11,11 @@ import bpy
 import numpy as np
 
 from ... import core
+from ...core.arguments import many
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.touch_object import AWAY, nearest_point
 from ..touch.types import Array, Object
 from ..touch.units import length
-from ..touch.wording import many
 from .both_ways import BothWays
 from .object_report import unit_of
 from .whole_surface import WholeSurface

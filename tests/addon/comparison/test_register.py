@@ -124,7 +124,7 @@ def test_the_patch_of_a_probe_is_where_its_probe_is(empty, suzanne, extension):
     assert report.registration_summary(found) == 'The contacts are 0.1 m off "A" (root mean square)'
     patch.parent = None
     depsgraph = empty.context.evaluated_depsgraph_get()
-    with pytest.raises(ValueError, match=r"poses on .* choose one of them"):
+    with pytest.raises(ValueError, match=r"The search has found 5 poses on .*: choose a lower number"):
         registration.register_patch(patch, suzanne, depsgraph, pose=99)
 
 

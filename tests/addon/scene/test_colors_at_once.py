@@ -56,7 +56,7 @@ def test_patches_share_a_range_and_may_be_given_one(empty, ball):
     empty.ops.tactile.reconstruct(target="Distant", location=(9, 0, 1), extent=0.4)
     assert empty.context.object["tactile"]["color_limit"] < own[1]  # Another object has a range of its own.
     empty.context.view_layer.objects.active = patches[0]
-    assert empty.ops.tactile.share_range() == {"FINISHED"}  # and says: 2 patches have one range of colors
+    assert empty.ops.tactile.share_range() == {"FINISHED"}  # and says: One range of colors for 2 patches
     assert [patch["tactile"]["color_limit"] for patch in patches] == [max(own)] * 2
     assert empty.data.objects["Distant Patch"]["tactile"]["color_limit"] == max(own)
     assert "tactile_color_range" not in other

@@ -268,3 +268,23 @@ def test_the_numbers_of_an_earlier_touch_are_gray_below_a_title(extension, empty
     texts = [text for text, _ in drawn()]
     assert texts.index("Last Touch") < texts.index("κ1")
     assert not any(dict(drawn())[name] for name in numbers)
+
+
+def test_a_single_thing_is_not_said_in_the_plural(extension, empty):
+    addon = extension.tactile_addon
+    found = {"target": "Cube", "vertices": 1, "overlap": 1.0, "extra_points": 9}
+    found |= {"vertex_distance_mean": 0.5, "vertex_distance_max": 0.5}
+    report = {"status": "ok", "radius": 1.0, "verification": found}
+    wording = addon.comparison.verification_wording
+    words = wording.verification_summary(report)[1]
+    assert words.startswith('At 1 vertex, "Cube" is 0.5 m off the patch on average')
+    found["vertices"] = 2
+    assert wording.verification_summary(report)[1].startswith('At 2 vertices, "Cube" is')
+    measured = {"status": "ok", "is_closed": True, "patches": 1, "contacts": 1, "height_std": 0.1}
+    measured |= {"tolerance": None, "radius": 1.0}
+    assert "1 patch of 1 contact;" in addon.whole_object.object_report.object_summary(measured)
+    made = addon.stability_map.map_report.map_table_rows(
+        {"source": "Cube", "touched": 1, "points": 1, "patches": 1, "in_doubt": 0, "refused": {}}
+        | {"method": "bayes", "degree": "auto", "spacing": 1.0, "extent": 1.0, "step": 0.1}
+    )
+    assert dict(made)["touched"] == "Cube, at 1 of 1 point"

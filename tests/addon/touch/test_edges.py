@@ -28,7 +28,7 @@ def report_of(bpy, location, **arguments):
 
 def test_a_patch_of_a_given_extent_says_where_its_curves_ended_before(empty, cube):
     message = report_of(empty, (0.9, 0.2, 1.0), extent=0.5)["message"]
-    assert message.endswith(" 3 of 6 half curves end at a crease, before the extent.")
+    assert message.endswith(" 3 of 6 half curves ended at a crease, before the extent.")
     assert "half curves" not in report_of(empty, (0.1, 0.2, 1.0), extent=0.5)["message"]
 
 
