@@ -49,6 +49,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
 
     stop = "Stop and Keep"
     meanwhile = {"PASS_THROUGH"}  # The scene may change, because a detached mesh is touched.
+    _counted: tuple[object, int] = (None, 0)  # The points that were counted last, after what they depend on.
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -96,11 +97,13 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         """A sentence on what will be touched at how many points, or on why it cannot be touched."""
         try:
             target = target_object(context, self.target)
-            depsgraph = context.evaluated_depsgraph_get()
-            count = expected_count(target, depsgraph, self.extent, self.spacing)
+            given = target.session_uid, self.extent, self.spacing
+            if given != self._counted[0]:  # A dialog is drawn often.
+                depsgraph = context.evaluated_depsgraph_get()
+                self._counted = given, expected_count(target, depsgraph, self.extent, self.spacing)
         except ValueError as error:
             return sentence(error)
-        return f"{target.name}: about {many(count, 'touch', 'touches')}"
+        return f"{target.name}: about {many(self._counted[1], 'touch', 'touches')}"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
