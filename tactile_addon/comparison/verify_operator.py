@@ -40,6 +40,7 @@ class Verification:
         self._target, self._given = target.session_uid, _inputs(patch, target)
         self._surface: MeshSurface | None = None
         self._found: dict[str, Any] = {}
+        self._off = 0.0
         self.done, self.count = 0, 0
 
     def look(self, depsgraph: bpy.types.Depsgraph) -> None:
@@ -71,6 +72,8 @@ class Verification:
         for found in core.verifying(r, self, np.vstack(seen)):
             self._found = found
             yield
+        # Of a coarse mesh few vertices are over the patch, or none.
+        self._off = core.height_error(r, self) or 0.0
 
     def write(self) -> TouchReport:
         """Writes what was found to the patch: its deviations, and `verification` in its record."""
@@ -84,7 +87,7 @@ class Verification:
         shown.share_range(patch)
         record["verification"] = {"target": self.target, **self._found}
         if record["status"] != "outdated":
-            mean = self._found.get("vertex_distance_mean", 0.0)
+            mean = max(self._found.get("vertex_distance_mean", 0.0), self._off)
             record.update(judgment(r, mean, record["ended"], record.get("few_facets", False)))
         return record.to_dict()
 

@@ -14,6 +14,7 @@ from .types import Array, Point
 
 # The surface itself ends a curve in these ways.
 SURFACE_STOPS = (core.CREASE, core.NO_CONTACT, core.NOT_MONGE)
+RIM_POINTS = 48  # The deviation of the height is looked at in this many places of the boundary.
 AT_POINT = 1e-6  # A half curve that is shorter than this share of the radius ends at the point.
 
 
@@ -102,6 +103,7 @@ class TouchReport(TypedDict, total=False):
     given_contacts: int
     misses: list[float]  # How far the curves miss their common point.
 
+    height_std_rim: float  # The largest one on the boundary of the domain.
     area: float
     total_absolute_curvature: float
     condition_number: float
@@ -180,7 +182,9 @@ def suggestion_report(result: core.Reconstruction, reference: Array) -> Suggeste
 
 def measures(result: core.Reconstruction) -> TouchReport:
     """The parts of a report that take long or matter only once a gesture has ended."""
+    rim = result.domain.boundary(RIM_POINTS)
     return {
+        "height_std_rim": float(result.height_std(*rim.T).max()),
         "area": result.domain.area,
         "total_absolute_curvature": result.total_absolute_curvature,
         "condition_number": result.condition_number,
