@@ -13,7 +13,6 @@ import numpy as np
 
 from ... import core
 from ...core.arguments import unit_vector
-from ...core.scan.facets import is_beside_bend
 from .detached_mesh import DetachedMesh
 from .settings import MOST_PLANES, STEEPEST
 from .single_precision import require_single
@@ -125,7 +124,9 @@ def _explored(
     except core.DegenerateCurvesError as error:
         facet = surface.facet(point)
         is_large = facet >= LARGE_FACET * (step or FINEST_STEP * surface.size)
-        if more["noise"] or not (is_large and is_beside_bend(point, surface.face_near, surface.corners_of)):
+        if more["noise"] or not (
+            is_large and core.is_beside_bend(point, surface.face_near, surface.corners_of)
+        ):
             raise
         raise ValueError(
             f"{error}. The facets there are {length(facet)} long: add a Subdivision modifier if the "

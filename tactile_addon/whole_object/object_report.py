@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the panel and the shell say of a whole object."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,13 +14,15 @@ from ..touch import units
 from ..touch.units import Unit
 from ..touch.wording import vector
 
-LEAST_NUMBER = 10.0  # Lengths are in a unit that suits this many tolerances.
+# A surface is good if this share of it is within the tolerance of the mesh, and all within so many.
+WITHIN_SHARE, OFF_TOLERANCES = 0.99, 3.0
+FACETED = 0.5  # The panel says that curvatures are those of facets from this share of the area on.
 ZERO = 1e-6  # A distance below this share of the size counts as 0.
 
 
 def unit_of(record: Mapping[str, Any]) -> Unit:
-    """The unit of a report, which has lengths from below the tolerance to far above it."""
-    return units.unit_of(bpy.context.scene, LEAST_NUMBER * (record["tolerance"] or record["height_std"]))
+    """The unit of a report, which is that of its curvatures, too."""
+    return units.unit_of(bpy.context.scene, record["radius"])
 
 
 def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -34,6 +37,8 @@ def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("verdict", verdict_of(record)),
         ("surface", _surface(record)),
         ("message", record["message"]),
+        ("agreement", agreement(record)),
+        ("facets", facets(record)),
         ("patches", f"{record['patches']}, of which {record['in_doubt']} alone would be in doubt"),
         ("edges of their graph", record["edges"]),
         ("tolerance", _tolerance(record)),
@@ -54,7 +59,38 @@ def verdict_of(record: Mapping[str, Any]) -> str:
 
 def object_verdict(record: Mapping[str, Any]) -> str:
     """The verdict and what it rests on, for the panel."""
-    return f"{verdict_of(record)}. {record['message']}"
+    return " ".join(filter(None, (f"{verdict_of(record)}.", record["message"], agreement(record))))
+
+
+def is_all_within(record: Mapping[str, Any]) -> bool:
+    """Whether the verdict is good, and no place is farther off the mesh than the tolerance."""
+    return record["status"] == "ok" and record.get("deviation_max", 0.0) <= (record["tolerance"] or math.inf)
+
+
+def agreement(record: Mapping[str, Any]) -> str | None:
+    """How far surface and mesh agree, and how far they have to for a good verdict; None without a mesh."""
+    if "within" not in record:
+        return None
+    unit, tolerance = unit_of(record), record["tolerance"]
+    share = within(record["within"], record["deviation_max"] <= tolerance)
+    return (
+        f"{share} of the surface is within the tolerance of {units.say(tolerance, 1, unit)}, and the "
+        f"farthest place is {deviation(record, 'max')} off. "
+        f"Good takes {100.0 * WITHIN_SHARE:g} % and at most {units.say(OFF_TOLERANCES * tolerance, 1, unit)}."
+    )
+
+
+def within(share: float, is_all: bool) -> str:
+    """The share of the area within the tolerance in words; it is rounded down."""
+    return "All" if is_all else f"{math.floor(1e3 * min(share, 0.999)) / 10.0:g} %"
+
+
+def facets(record: Mapping[str, Any]) -> str | None:
+    """A sentence if most curvatures are those of facets, as the verdict on a patch has it; or None."""
+    share = record.get("faceted", 0.0)
+    if share < FACETED:
+        return None
+    return f"Curvature of the facets, not of the shape, on {100.0 * share:.0f} % of the area"
 
 
 def object_summary(record: Mapping[str, Any]) -> str:
