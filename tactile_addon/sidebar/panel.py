@@ -277,7 +277,7 @@ def _draw_comparison(
 ) -> None:
     """Draws where the patch was put on a mesh, and how far it is off one, if these are known."""
     if "registration" in record:
-        draw_sentence(context, layout, registration_summary(record["registration"]), "SNAP_ON")
+        draw_sentence(context, layout, registration_summary(record["registration"], unit), "SNAP_ON")
     if "verification" not in record:
         return
     found, layout = record["verification"], layout.column()

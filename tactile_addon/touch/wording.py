@@ -43,7 +43,11 @@ def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
         ("fit error (6)", _shared(report, "fit_error", unit)),
         ("standard deviation of the height", _shared(report, "height_std", unit)),
         ("mesh to patch", _verification(report, unit)),
-        *([("put onto", registration_summary(report["registration"]))] if "registration" in report else []),
+        *(
+            [("put onto", registration_summary(report["registration"], unit))]
+            if "registration" in report
+            else []
+        ),
         *_verified_rows(report.get("verification"), unit),
         ("suggested next plane", _suggestion(report["suggested_plane"], unit)),
         ("total |K| (8)", f"{report['total_absolute_curvature']:.4g}"),
@@ -158,10 +162,10 @@ def _verified_rows(found: Mapping[str, Any] | None, unit: Unit) -> list[tuple[st
     ]
 
 
-def registration_summary(found: Registration) -> str:
-    """A sentence on where a patch was put by registration."""
+def registration_summary(found: Registration, unit: Unit | None = None) -> str:
+    """A sentence on where a patch was put by registration, in this unit or in that of the residual."""
     residual = found["residuals"][found["pose"] - 1]
-    words = f'The contacts are {length(residual)} off "{found["target"]}" (root mean square)'
+    words = f'The contacts are {length(residual, unit)} off "{found["target"]}" (root mean square)'
     if not found["is_ambiguous"]:
         return words
     return f"{words}; others of its {len(found['residuals'])} poses are about as good"

@@ -194,6 +194,16 @@ def test_lengths_in_messages_are_in_the_unit_of_the_scene(extension, empty):
         empty.ops.tactile.pick(target="Cube", location=(0.0, 0.0, 0.025), extent=float("nan"))
 
 
+def test_panels_have_the_unit_that_fields_have(extension, empty):
+    """In the default scene fields show meters. Far smaller lengths would be long numbers in them."""
+    units, scene = extension.tactile_addon.touch.units, empty.context.scene
+    assert scene.unit_settings.length_unit == "METERS"
+    assert [units.unit_of(scene, size)[0] for size in (5.0, 0.05, 0.012, 0.005)] == ["m", "m", "m", "mm"]
+    report = extension.tactile_addon.whole_object.object_report
+    record = {"radius": 0.3, "tolerance": 0.004, "height_std": 0.001}
+    assert report.unit_of(record) == ("m", 1.0)  # as the range of its colors
+
+
 class Layout:
     """Keeps what a panel draws in `drawn`, as (text, whether it is not gray); its parts share the list."""
 
