@@ -91,6 +91,7 @@ def touch(
     require_single("patch", found.result.radius, found.result.frame.origin)
     report: TouchReport = {
         "source": obj.name,
+        "object_size": surface.size,
         "method": fit["method"],
         "noise": noise,
         "seed": seed,

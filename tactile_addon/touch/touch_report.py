@@ -90,6 +90,7 @@ class TouchReport(TypedDict, total=False):
     degree: int
     axes: list[list[float]]  # (3, 3), see core.SamplingPlane.axes.
     seconds: dict[str, float]
+    object_size: float  # The longest edge of the bounding box.
     extent: float
     step: float
     noise: float

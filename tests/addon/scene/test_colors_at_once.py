@@ -145,6 +145,19 @@ def test_a_flat_patch_has_a_rim_that_lies_in_it(empty):
     assert np.abs(rim[:, 2]).max() < 0.01
 
 
+def test_the_range_of_a_flat_patch_follows_what_is_significant(empty):
+    """Beside a corner a patch is small and its curvature unknown, but it is as flat as any other."""
+    empty.ops.mesh.primitive_cube_add()
+    ranges = []
+    for location in ((0.997, 0.997, 1.0), (0.1, 0.2, 1.0)):
+        patch = touch(empty, location, target="Cube", extent=0.0)
+        ranges.append(patch["tactile"]["own_limit"])
+    assert ranges == pytest.approx([1e-3 / 2.0**2] * 2)
+    noisy = touch(empty, (-0.1, 0.2, 1.0), target="Cube", noise=1e-3)
+    largest = np.abs(values(noisy.data, "gaussian_curvature")).max()
+    assert noisy["tactile"]["own_limit"] >= 2.0 * noisy["tactile"]["gaussian_curvature_std"] > largest > 0.0
+
+
 def test_a_map_is_above_its_mesh_and_below_patches(empty, ball):
     empty.ops.tactile.stability_map(target="Sphere", extent=0.4, spacing=0.4)
     painted = empty.context.object
