@@ -21,8 +21,8 @@ ZERO = 1e-6  # A distance below this share of the size counts as 0.
 
 
 def unit_of(record: Mapping[str, Any]) -> Unit:
-    """The unit of a report, which is that of its curvatures, too."""
-    return units.unit_of(bpy.context.scene, record["radius"])
+    """The unit of a report in the open scene."""
+    return units.unit_of_report(bpy.context.scene, record)
 
 
 def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -197,9 +197,13 @@ def test_panels_have_the_unit_that_fields_have(extension, empty):
     units, scene = extension.tactile_addon.touch.units, empty.context.scene
     assert scene.unit_settings.length_unit == "METERS"
     assert [units.unit_of(scene, size)[0] for size in (5.0, 0.05, 0.012, 0.005)] == ["m", "m", "m", "mm"]
-    report = extension.tactile_addon.whole_object.object_report
-    record = {"radius": 0.3, "tolerance": 0.004, "height_std": 0.001}
-    assert report.unit_of(record) == ("m", 1.0)  # as the range of its colors
+    record = {"radius": 0.01, "tolerance": 2e-4, "height_std": 1e-5, "color_limit": 4800.0}
+    assert extension.tactile_addon.whole_object.object_report.unit_of(record)[0] == "mm"
+    empty.ops.mesh.primitive_cube_add()
+    empty.context.object["tactile_object"] = record
+    ranges = extension.tactile_addon.scene.color_range
+    assert ranges.unit_of_range(empty.context.object, scene)[1][0] == "mm"  # as the numbers below it
+    assert empty.context.object.tactile_range == pytest.approx(0.0048)
 
 
 class Layout:
