@@ -68,8 +68,11 @@ def is_all_within(record: Mapping[str, Any]) -> bool:
 
 
 def agreement(record: Mapping[str, Any]) -> str | None:
-    """How far surface and mesh agree, and how far they have to for a good verdict; None without a mesh."""
-    if "within" not in record:
+    """How far surface and mesh agree, and how far they have to for a good verdict; None if that says nothing.
+
+    So it is without a mesh, and where touches could go on.
+    """
+    if "within" not in record or record["uncovered"]:
         return None
     unit, tolerance = unit_of(record), record["tolerance"]
     share = within(record["within"], record["deviation_max"] <= tolerance)

@@ -139,18 +139,19 @@ def test_the_verdict_says_how_much_is_within_the_tolerance(empty, extension, bal
 
 
 def test_a_whole_object_of_facets_says_that_its_curvature_is_theirs(empty, extension):
-    facets = extension.tactile_addon.whole_object.object_report.facets
+    report = extension.tactile_addon.whole_object.object_report
     empty.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
     source = empty.context.object
     _, record = touched(empty, most=4)
-    assert facets(record) == "Curvature of the facets, not of the shape, on 100 % of the area"
-    assert dict(extension.tactile_addon.whole_object.object_report.object_table_rows(record))["facets"]
+    assert report.object_verdict(record) == f"Incomplete. {record['message']}"
+    assert report.facets(record) == "Curvature of the facets, not of the shape, on 100 % of the area"
+    assert dict(report.object_table_rows(record))["facets"] == report.facets(record)
     assert empty.ops.tactile.add_subdivision() == {
         "FINISHED"
     }  # and says that it is subdivided: touch it all over again
     assert [(m.type, m.levels) for m in source.modifiers] == [("SUBSURF", 3)]
     empty.context.view_layer.objects.active = source
-    assert facets(touched(empty, most=4)[1]) is None
+    assert report.facets(touched(empty, most=4)[1]) is None
 
 
 def test_without_an_edge_length_the_mesh_is_that_of_the_distances(ball, touches_of):
