@@ -72,10 +72,7 @@ def verdict(report: TouchReport, unit: Unit) -> str:
         count, where = early[0]
         number = "all" if count == stops.total() else f"{count} of {stops.total()}"
         return f"Good, with {number} half curves cut short {where}"
-    words = f"Good: heights to ± {say(report['height_std'], 1, unit)}"
-    if "height_std_rim" not in report:  # The gesture has not ended.
-        return words
-    return f"{words}, ± {say(report['height_std_rim'], 1, unit)} at the rim"
+    return f"Good: heights to ± {say(report['height_std'], 1, unit)}"
 
 
 def added_planes(report: TouchReport, unit: Unit) -> str:

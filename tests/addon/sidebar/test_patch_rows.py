@@ -51,8 +51,6 @@ def test_a_flat_patch_has_no_shape_index(said, empty):
 
 def test_the_verdict_says_good_and_how_good(wording):
     assert wording.verdict(record(), UNIT) == "Good: heights to ± 0.0123 mm"
-    known = record(height_std_rim=0.04)
-    assert wording.verdict(known, UNIT) == "Good: heights to ± 0.0123 mm, ± 0.04 mm at the rim"
     blind = record(
         message="The patch describes its contacts. These planes cannot show 3 of the 28 shape terms."
     )
@@ -67,6 +65,13 @@ def test_the_verdict_says_what_limits_a_good_patch(wording, empty):
     assert words == "Good, with 3 of 6 half curves cut short at a crease"
     report = patch["tactile"].to_dict() | {"stops": [["crease", "crease"]] * 3}
     assert wording.verdict(report, UNIT) == "Good, with all half curves cut short at a crease"
+
+
+def test_the_deviation_at_the_rim_stands_below_the_mean(said, ball):
+    rows = dict(said.main_rows(ball[1], UNIT))
+    mean, rim = (float(rows[key].split()[1]) for key in ("Height", "At the Rim"))
+    assert 1.5 < rim / mean < 10.0
+    assert dict(said.main_rows({**ball[1], "height_std_rim": 0.04}, UNIT))["At the Rim"] == "± 0.04 mm"
 
 
 @pytest.mark.parametrize("status", ["uncertain", "not_converged"])
