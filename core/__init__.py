@@ -43,7 +43,7 @@ from .reconstruction.next_plane import azimuth_of, suggest_plane
 from .reconstruction.options import METHODS
 from .reconstruction.result import Reconstruction
 from .reconstruction.serialization import from_dict, to_dict
-from .scan.facets import has_few_facets
+from .scan.facets import has_few_facets, is_beside_bend
 from .scan.pose_search import Pose, register
 from .scan.sampling import scattered, spaced, spaced_count
 from .scan.verification import reachable, verify, verifying
@@ -94,6 +94,7 @@ __all__ = [
     "has_few_facets",
     "height_error",
     "in_running_order",
+    "is_beside_bend",
     "judged_by_mesh",
     "mean_height_stds",
     "overlapped",

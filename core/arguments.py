@@ -75,6 +75,11 @@ def shown(value: object) -> str:
     return " ".join(reprlib.repr(value).split())
 
 
+def many(count: int, one: str, several: str) -> str:
+    """A count with its noun in a message, as in "1 touch"."""
+    return f"{count} {one if count == 1 else several}"
+
+
 def _shape_text(shape: tuple[int | None, ...]) -> str:
     return "(" + ", ".join("n" if size is None else str(size) for size in shape) + ")"
 

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import bpy
 
 from .. import core
+from ..core.arguments import many
 from .comparison.register_operator import register_patch
 from .comparison.verification_wording import verification_columns
 from .comparison.verify_operator import verify_patch
@@ -51,7 +52,7 @@ def _lines_of(rows: Callable[[Any], list[tuple[str, str]]]) -> Callable[[Any], s
 COMMANDS = {
     "reconstruct": Command("reconstruct", patch_record.RECORD, _lines_of(readable_rows), {}),
     "fit": Command("import_contacts", patch_record.RECORD, _lines_of(readable_rows), {}),
-    "table": Command("", "", lambda report: f"{report['rows']} rows written", {}),
+    "table": Command("", "", lambda report: f"{many(report['rows'], 'row', 'rows')} written", {}),
     "object": Command(
         "touch_all_over", patch_record.ATLAS_RECORD, _lines_of(object_table_rows), {"progress": True}
     ),

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arguments import LARGEST, Array, finite_array, number
+from ..arguments import LARGEST, Array, finite_array, many, number
 from ..contours.contour import Contour, SamplingPlane
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
@@ -141,10 +141,11 @@ class Atlas:
 
     def __repr__(self) -> str:
         mesh, size = self.reference.mesh, self.reference.indicator.size
-        ended = "closed" if mesh.is_closed else f"open at {len(mesh.border)} edges"
+        ended = "closed" if mesh.is_closed else f"open at {many(len(mesh.border), 'edge', 'edges')}"
         return (
             f"Atlas, {self.status}: {self.message}\n"
-            f"  {len(self.patches)} patches, size {size:.4g}, {len(self.uncovered)} uncovered places\n"
+            f"  {many(len(self.patches), 'patch', 'patches')}, size {size:.4g}, "
+            f"{many(len(self.uncovered), 'uncovered place', 'uncovered places')}\n"
             f"  mesh of {len(mesh.triangles)} triangles, {ended}, edges {self.reference.edge:.3g}, "
             f"+- {mesh.std.mean() if len(mesh.std) else 0.0:.2g} in the mean"
         )
@@ -203,8 +204,7 @@ class Atlas:
 
     def _ended(self) -> tuple[str, str]:
         """The verdict where places are uncovered."""
-        count = len(self.uncovered)
-        places = "one place" if count == 1 else f"{count} places"
+        places = many(len(self.uncovered), "place", "places")
         if self.contacts is not None:
             return "uncertain", f"Nothing was felt beyond {places} where the object may go on: touch there."
         if self.is_cut_short:
@@ -297,7 +297,7 @@ class Atlas:
         if wrong:
             advice = "allow more touches" if self.is_cut_short else "use a smaller tolerance"
             return "uncertain", (
-                f"{wrong} of {count} rays from outside meet something else than the surface: {advice}."
+                f"{wrong} of {count} rays from outside met something else than the surface: {advice}."
             )
         if self.contacts is not None:
             return "ok", "The surface is closed, and all contacts agree with it."

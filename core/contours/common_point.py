@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import LARGEST, Array, finite_array, list_of
+from ..arguments import LARGEST, Array, finite_array, list_of, many
 from .contour import Contour
 from .curves import (
     LEAST_CONTACTS,
@@ -45,9 +45,9 @@ def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
             'a column "curve", give more curves, or give the point'
         )
     for number, contour in enumerate(found, 1):
-        if len(contour.points) <= LEAST_CONTACTS:
+        if (count := len(contour.points)) <= LEAST_CONTACTS:
             raise DegenerateCurvesError(
-                f"curve {number} has {len(contour.points)} contacts, and {LEAST_CONTACTS + 1} are "
+                f"curve {number} has {many(count, 'contact', 'contacts')}, and {LEAST_CONTACTS + 1} are "
                 "needed to tell where it runs: measure more, or give the reference point"
             )
     origin = found[0].points[0]  # Far from the world's origin only differences of points are exact.

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arguments import LARGEST, Array, finite_array
+from ..arguments import LARGEST, Array, finite_array, many
 from ..bayes.joint_fit import posterior_of
 from ..bayes.normals import contradiction, measured_normals, scatter
 from ..bayes.other_curves import contradicting_curve
@@ -73,13 +73,13 @@ class Reconstruction:
     def __repr__(self) -> str:
         point = ", ".join(f"{x:.4g}" for x in self.frame.origin)
         normal = ", ".join(f"{x:.4f}" for x in self.normal)
-        felt = f"{len(self.contours)} contours" if self.contours else "strokes"
+        felt = many(len(self.contours), "contour", "contours") if self.contours else "strokes"
         return (
             f"Reconstruction, {self.status}: {self.message}\n"
             f"  point ({point}), normal ({normal}), L {self.radius:.4g}\n"
             f"  k1 {self.k1:.4g} +- {self.k1_std:.2g}, k2 {self.k2:.4g} +- {self.k2_std:.2g}\n"
             f"  height +- {self.mean_height_std:.2g} in the mean, {self.method}, degree {self.patch.degree}, "
-            f"{len(self.contacts)} contacts of {felt}"
+            f"{many(len(self.contacts), 'contact', 'contacts')} of {felt}"
         )
 
     @property

@@ -104,7 +104,7 @@ def notes(r: Judged) -> str:
     """Further notes, whatever the status: sentences, each after a space."""
     message = ""
     if r.taps is not None and r.taps.missed:
-        message += f" {r.taps.missed} of {r.taps.number} taps between the curves feel no surface."
+        message += f" At {r.taps.missed} of {r.taps.number} taps between the curves there is no surface."
     if r.posterior.is_round:
         message += " The two curvatures are equal within their error, so there are no principal directions."
     if r.null_space_dimension:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arguments import LARGEST, SMALLEST, Array, finite_array, list_of
+from ..arguments import LARGEST, SMALLEST, Array, finite_array, list_of, many
 from ..bayes.joint_fit import frame_update
 from ..contours.contour import Contour, cross, equal_points
 from ..contours.local_geometry import DegenerateCurvesError
@@ -203,8 +203,8 @@ def _farthest(distances: Array) -> float:
 
 def _too_few(count: int) -> DegenerateCurvesError:
     return DegenerateCurvesError(
-        f"the strokes have {count} contacts around the point, and {len(QUADRIC)} are needed: "
-        "measure more, or use a larger radius"
+        f"the strokes have {many(count, 'contact', 'contacts')} around the point, and {len(QUADRIC)} are "
+        "needed: measure more, or use a larger radius"
     )
 
 

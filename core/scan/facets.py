@@ -68,6 +68,17 @@ def has_few_facets(
     return any(_is_smooth(facet, r.radius, lambda at: shape(face_near(at))) for facet in nearest)
 
 
+def is_beside_bend(
+    point: Array, face_near: Callable[[Array], int], corners_of: Callable[[int], ArrayLike]
+) -> bool:
+    """Whether the facet nearest to a point (3,) has an edge that stands for a smooth bend, as on a ball.
+
+    The arguments are those of `has_few_facets`.
+    """
+    facet = _facet(corners_of(face_near(point)))
+    return _is_smooth(facet, 0.0, lambda at: _facet(corners_of(face_near(at))))
+
+
 def _follows_facets(r: Reconstruction, points: Array) -> bool:
     """Whether the paraboloid nearest to points (n, 3) of the world has other curvatures than the fit."""
     x, y, z = r.frame.to_local(points).T / r.radius

@@ -13,6 +13,7 @@ from bpy.props import IntProperty, StringProperty
 from mathutils import Matrix
 
 from ... import core
+from ...core.arguments import many
 from ..probes import probe
 from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, target_object
@@ -80,7 +81,8 @@ class Search:
     def put(self, pose: int) -> Registration:
         """Moves the patch to one of the poses, and returns its `registration`, a dict."""
         if pose > len(self.poses):
-            raise ValueError(f'There are {len(self.poses)} poses on "{self.target}": choose one of them')
+            poses = many(len(self.poses), "pose", "poses")
+            raise ValueError(f'The search has found {poses} on "{self.target}": choose a lower number')
         chosen, matrix = self.poses[pose - 1], np.eye(4)
         patch: Object = bpy.data.objects.get(self.patch)
         if patch is None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 
+from ...core.arguments import many
 from ..touch import units
 from ..touch.touch_report import TouchReport
 from ..touch.units import Unit
@@ -37,7 +38,7 @@ def verification_summary(record: TouchReport) -> tuple[bool, str]:
     unit = units.unit_of(bpy.context.scene, record["radius"])
     mean, most = (_length(found, f"vertex_distance_{key}", unit) for key in ("mean", "max"))
     return False, (
-        f'{vertices} vertices of "{name}" are {mean} off the patch on average, '
+        f'At {many(vertices, "vertex", "vertices")}, "{name}" is {mean} off the patch on average, '
         f"{most} at most; the mesh covers {percent:.0f} % of it"
     )
 

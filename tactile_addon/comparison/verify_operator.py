@@ -10,6 +10,7 @@ import numpy as np
 from bpy.props import StringProperty
 
 from ... import core
+from ...core.arguments import many
 from ...core.steps import result_of
 from ..probes import probe, touch_again
 from ..probes.change_handlers import is_pending
@@ -39,6 +40,7 @@ class Verification:
         self._target, self._given = target.session_uid, _inputs(patch, target)
         self._surface: MeshSurface | None = None
         self._found: dict[str, Any] = {}
+        self._off = 0.0
         self.done, self.count = 0, 0
 
     def look(self, depsgraph: bpy.types.Depsgraph) -> None:
@@ -70,6 +72,8 @@ class Verification:
         for found in core.verifying(r, self, np.vstack(seen)):
             self._found = found
             yield
+        # Of a coarse mesh few vertices are over the patch, or none.
+        self._off = core.height_error(r, self) or 0.0
 
     def write(self) -> TouchReport:
         """Writes what was found to the patch: its deviations, and `verification` in its record."""
@@ -83,7 +87,7 @@ class Verification:
         shown.share_range(patch)
         record["verification"] = {"target": self.target, **self._found}
         if record["status"] != "outdated":
-            mean = self._found.get("vertex_distance_mean", 0.0)
+            mean = max(self._found.get("vertex_distance_mean", 0.0), self._off)
             record.update(judgment(r, mean, record["ended"], record.get("few_facets", False)))
         return record.to_dict()
 
@@ -154,8 +158,8 @@ class TACTILE_OT_verify(InSlices, bpy.types.Operator):
 
     def _done(self) -> Progress:
         done, count = self._verification.done, self._verification.count
-        share = done / count if count else None
-        return f'Comparing with "{self._verification.target}": {done} of {count} vertices', share
+        share, vertices = done / count if count else None, many(count, "vertex", "vertices")
+        return f'Comparing with "{self._verification.target}": {done} of {vertices}', share
 
     def _finish(self, context: bpy.types.Context) -> Outcome:
         record = self._verification.write()

@@ -18,13 +18,14 @@ from bpy.props import (
 from bpy_extras.io_utils import ImportHelper
 
 from ... import core
+from ...core.arguments import many
 from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import is_in_object_mode, make_active, report_error
 from ..scene import patch_object
 from ..touch.settings import FitSettings, draw_chosen, draw_solver, length_property
 from ..touch.types import Outcome
 from ..touch.units import length
-from ..touch.wording import fit_summary, many
+from ..touch.wording import fit_summary
 from ..whole_object import whole_mesh
 from ..whole_object.object_report import object_summary
 from . import measured

@@ -12,6 +12,7 @@ from bpy.props import BoolProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ... import core
+from ...core.arguments import many
 from ..probes import probe
 from ..probes.operators import polls, report_error
 from ..scene import patch_record
@@ -107,7 +108,8 @@ class TACTILE_OT_export_table(bpy.types.Operator, ExportHelper):  # type: ignore
             patch_table.write(self.filepath, patches, context.scene)
         except (OSError, ValueError) as error:
             return report_error(self, error)
-        self.report({"INFO"}, f'Wrote a table of {len(patches)} patches: "{Path(self.filepath).name}"')
+        count, name = many(len(patches), "patch", "patches"), Path(self.filepath).name
+        self.report({"INFO"}, f'Wrote a table of {count}: "{name}"')
         return {"FINISHED"}
 
 

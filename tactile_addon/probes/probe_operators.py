@@ -9,11 +9,12 @@ from typing import Any
 import bpy
 from bpy.props import IntProperty
 
+from ...core.arguments import many
 from ..scene import color_range, patch_object, patch_record
 from ..scene.viewports import show_colors, shows_colors
 from ..touch import units
 from ..touch.settings import MOST_PLANES, length_property
-from ..touch.types import OperatorMixin, Outcome
+from ..touch.types import Object, OperatorMixin, Outcome
 from ..touch.wording import added_planes, verdict
 from . import probe, touch_again
 from .operators import has_patch, is_in_object_mode, is_unlocked, polls, report_error, waiting
@@ -153,27 +154,47 @@ class TACTILE_OT_add_subdivision(_ProbeOperator, bpy.types.Operator):
     bl_idname = "tactile.add_subdivision"
     bl_label = "Add Subdivision"
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if _whole_object(context) is None:
+            return super().poll(context)
+        return is_in_object_mode(cls, context, "Modifiers are added")
+
     def execute(self, context: bpy.types.Context) -> Outcome:
-        found = probe.probe_of(context.view_layer.objects.active)
-        target = found.tactile_probe.target
+        found, whole = probe.probe_of(context.view_layer.objects.active), _whole_object(context)
+        target = found.tactile_probe.target if whole is None else bpy.data.objects.get(whole["source"])
         if target is None or not target.is_editable:
             return report_error(self, ValueError("The target cannot be changed: make it local first"))
-        modifier = next((m for m in reversed(target.modifiers) if m.type == "SUBSURF"), None)
-        if modifier is None:
-            modifier, level = target.modifiers.new("Subdivision", "SUBSURF"), 1
-            while level < SUBDIVISIONS and 4 ** (level + 1) * len(target.data.polygons) <= MOST_FACES:
-                level += 1
-        else:
-            level = modifier.levels + 1
-        modifier.levels, modifier.render_levels = level, max(level, modifier.render_levels)
-        modifier.show_viewport = True
+        _subdivide(target)
         context.view_layer.update()
+        if whole is not None:
+            self.report({"INFO"}, f'"{target.name}" is subdivided: touch it all over again')
+            return {"FINISHED"}
         touch_again.refresh(found, context)
         if found.tactile_probe.message:
             return report_error(self, ValueError(found.tactile_probe.message))
         record = probe.record_of(found)
         self.report({"INFO"}, verdict(record, units.unit_of(context.scene, record["radius"])))
         return {"FINISHED"}
+
+
+def _whole_object(context: bpy.types.Context) -> Any:
+    """The report of the active object if it is a whole object, or None."""
+    active = context.view_layer.objects.active
+    return None if active is None else active.get(patch_record.ATLAS_RECORD)
+
+
+def _subdivide(target: Object) -> None:
+    """Gives an object a Subdivision Surface modifier, or one more level of the one it has."""
+    modifier: Any = next((m for m in reversed(target.modifiers) if m.type == "SUBSURF"), None)
+    if modifier is None:
+        modifier, level = target.modifiers.new("Subdivision", "SUBSURF"), 1
+        while level < SUBDIVISIONS and 4 ** (level + 1) * len(target.data.polygons) <= MOST_FACES:
+            level += 1
+    else:
+        level = modifier.levels + 1
+    modifier.levels, modifier.render_levels = level, max(level, modifier.render_levels)
+    modifier.show_viewport = True
 
 
 class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
@@ -224,7 +245,7 @@ class TACTILE_OT_share_range(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> Outcome:
         patch = probe.patch_near(context.view_layer.objects.active)
         count = color_range.share(patch, context.view_layer.objects)
-        self.report({"INFO"}, f"{count} patches have one range of colors")
+        self.report({"INFO"}, f"One range of colors for {many(count, 'patch', 'patches')}")
         return {"FINISHED"}
 
 

@@ -18,7 +18,7 @@ from .patch_record import ATLAS_RECORD, POWERS, RANGE, RECORD, is_colored, repor
 def unit_of_range(patch: Object, scene: bpy.types.Scene) -> tuple[int, Unit]:
     """The power of length in the quantity that a patch or whole object shows, and the unit of its legend."""
     report = _record(patch)
-    unit = ("", 1.0) if report is None else units.unit_of(scene, report["radius"])
+    unit = ("", 1.0) if report is None else units.unit_of_report(scene, report)
     return POWERS[patch.tactile_colors], unit
 
 

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ..touch.touch_report import TouchReport
-from ..touch.types import Object
+from ..touch.types import Array, Object
 from . import colors
 from .attributes import COLOR, CURVATURE_STD, CURVATURES
 from .mesh_data import ABOVE, own_mesh, values
@@ -24,6 +24,15 @@ from .patch_record import (
 )
 
 LEAST_RANGE = 1e-3  # The range of colors is no smaller, in unit radius, so that a plane is pale green.
+# That of a patch's curvatures is no smaller in units of the object's size, as all patches of a mesh have it.
+SIGNIFICANT = 2.0  # It is no smaller than this many deviations, because smaller values may be noise,
+PALE = 0.05  # unless all of these are below this share of it.
+# The deviations of curvatures by name.
+STDS = {
+    "gaussian_curvature": "gaussian_curvature_std",
+    "mean_curvature": "mean_curvature_std",
+    "curvedness": "mean_curvature_std",
+}
 LEAST_SHARE = 0.5  # That of K is no smaller than this share of the median curvedness, squared.
 LAYER = "tactile_layer"  # A patch's number among those that overlap; 0 is the lowest.
 ABOVE_OTHERS = "Above Other Patches"  # The modifier that draws it above those with lower numbers,
@@ -40,8 +49,8 @@ def recolor(obj: Object) -> None:
     own_mesh(obj)
     shown, mesh = obj.tactile_colors, obj.data
     shades, record = values(mesh, shown), obj[RECORD if RECORD in obj else ATLAS_RECORD]
-    floor = LEAST_RANGE * record["radius"] ** POWERS[shown]
     unknown = _unknown(mesh) if shown in CURVATURES else []
+    floor = _least_range(record, shown, np.delete(shades, unknown))
     curvedness = np.delete(values(mesh, "curvedness"), unknown)
     if shown == "gaussian_curvature" and len(curvedness):
         # |K| is at most the square of the curvedness. Far below that, as on a cylinder, it is as good as 0.
@@ -54,6 +63,15 @@ def recolor(obj: Object) -> None:
         mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
     mesh.update()
     record["color_limit"] = limit
+
+
+def _least_range(record: Mapping[str, Any], shown: str, shades: Array) -> float:
+    """The smallest range of colors for values (n,): with it, those that may be noise are pale."""
+    length = record.get("object_size", record["radius"]) if shown in STDS else record["radius"]
+    least = float(LEAST_RANGE * length ** POWERS[shown])
+    if colors.symmetric_range(shades, 0.0) <= PALE * least:
+        return least
+    return max(least, SIGNIFICANT * record.get(STDS.get(shown, ""), 0.0))
 
 
 def _unknown(mesh: bpy.types.Mesh) -> Any:

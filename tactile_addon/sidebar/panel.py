@@ -35,7 +35,7 @@ from ..touch.units import Unit
 from ..touch.wording import registration_summary, verdict
 from ..viewport.pick import TACTILE_OT_pick
 from ..whole_object.object_operator import TACTILE_OT_touch_all_over
-from ..whole_object.object_report import deviation, object_rows, object_verdict
+from ..whole_object.object_report import deviation, facets, is_all_within, object_rows, object_verdict
 from ..whole_object.surface_operators import TACTILE_OT_look_farthest, TACTILE_OT_mesh_again
 from .dots import dot
 from .patch_rows import found_values, main_rows, other_rows, plane_rows
@@ -185,7 +185,12 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         if obj is None or patch_record.ATLAS_RECORD not in obj:
             return
         record = obj[patch_record.ATLAS_RECORD]
-        draw_sentence(context, layout, object_verdict(record), ICONS.get(record["status"], "ERROR"))
+        good = "CHECKMARK" if is_all_within(record) else "INFO"
+        icon = good if record["status"] == "ok" else "ERROR"
+        draw_sentence(context, layout, object_verdict(record), icon)
+        if words := facets(record):
+            draw_sentence(context, layout, words, "ERROR")
+            layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
         _draw_colors(context, layout, obj, "tactile_colors")
         if patch_record.is_colored(obj):
             _draw_range(context, layout, obj)
@@ -272,7 +277,7 @@ def _draw_comparison(
 ) -> None:
     """Draws where the patch was put on a mesh, and how far it is off one, if these are known."""
     if "registration" in record:
-        draw_sentence(context, layout, registration_summary(record["registration"]), "SNAP_ON")
+        draw_sentence(context, layout, registration_summary(record["registration"], unit), "SNAP_ON")
     if "verification" not in record:
         return
     found, layout = record["verification"], layout.column()

@@ -21,7 +21,8 @@ LETTER, PADDING = 6.5, 12.0
 TIPS = {
     "κ1": "The smaller principal curvature at the point; below 0 the surface bulges outward",
     "κ2": "The larger principal curvature at the point; below 0 the surface bulges outward",
-    "Height": "Standard deviation of the height: how well the contacts determine it",
+    "Height": "Standard deviation of the height: how well the contacts determine it, on average",
+    "At the Rim": "The largest on the rim, where deviations from the mesh are largest; … until you let go",
     "Misfit": "Mean distance from the patch to the mesh's vertices over it; … until you let go, – if none",
     "1/κ1": "Radius of the circle that bends like the surface along the first principal direction",
     "1/κ2": "Radius of the circle that bends like the surface along the second principal direction",

@@ -4,6 +4,7 @@
 
 import bpy
 
+from ...core.arguments import many
 from ..probes import probe
 from ..probes.in_slices import InSlices, Progress
 from ..probes.number_fields import dragged
@@ -48,6 +49,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
 
     stop = "Stop and Keep"
     meanwhile = {"PASS_THROUGH"}  # The scene may change, because a detached mesh is touched.
+    _counted: tuple[object, int] = (None, 0)  # The points that were counted last, after what they depend on.
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -78,7 +80,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
 
     def _done(self) -> Progress:
         done, count = self._map.done, len(self._map.places)
-        return f"Stability Map: {done} of {count} points", done / max(count, 1)
+        return f"Stability Map: {done} of {many(count, 'point', 'points')}", done / max(count, 1)
 
     def _check(self, context: bpy.types.Context) -> None:
         self._map.surface.require_source(context)
@@ -95,11 +97,13 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         """A sentence on what will be touched at how many points, or on why it cannot be touched."""
         try:
             target = target_object(context, self.target)
-            depsgraph = context.evaluated_depsgraph_get()
-            count = expected_count(target, depsgraph, self.extent, self.spacing)
+            given = target.session_uid, self.extent, self.spacing
+            if given != self._counted[0]:  # A dialog is drawn often.
+                depsgraph = context.evaluated_depsgraph_get()
+                self._counted = given, expected_count(target, depsgraph, self.extent, self.spacing)
         except ValueError as error:
             return sentence(error)
-        return f"{target.name}: about {count} points are touched"
+        return f"{target.name}: about {many(self._counted[1], 'touch', 'touches')}"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

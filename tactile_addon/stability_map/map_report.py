@@ -7,9 +7,9 @@ from typing import Any
 
 import bpy
 
+from ...core.arguments import many
 from ..touch import units
 from ..touch.units import Unit
-from ..touch.wording import many
 from . import map_object
 from .stability import REASONS
 
@@ -22,8 +22,9 @@ def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     unit = units.unit_of(bpy.context.scene, record["spacing"])
     names = ("spacing", "extent", "step")
     lengths = [units.say(record[name], 1, unit) if record[name] else "auto" for name in names]
+    points = many(record["points"], "point", "points")
     return [
-        ("touched", f"{record['source']}, at {record['touched']} of {record['points']} points"),
+        ("touched", f"{record['source']}, at {record['touched']} of {points}"),
         ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
         ("refused", refused),
         ("fit", f"{record['method']}, degree {record['degree']}"),

@@ -24,6 +24,7 @@ EXTENT_SHARE = 1.0 / 8.0  # This share of the object's size stands for an extent
 SPACING_SHARE = 1.0 / 4.0  # The default spacing, as a share of the extent.
 BATCH = 20  # The number of touches that are fitted at once, in some hundredths of a second.
 GROWING_BATCH = 4  # Touches that choose their extent are fewer, because their fits have more contacts.
+MOST_COUNTED = 5000  # More points are not chosen just to be counted, which would take seconds.
 NEAREST_AT_ONCE = 10_000  # The number of vertices that get their nearest touch at once.
 EQUAL = 1e-3  # Areas that differ by a smaller share are equal but for rounding.
 NOTHING = -1.0  # Each quantity has this value where there is no patch.
@@ -46,10 +47,16 @@ def expected_count(obj: Object, depsgraph: bpy.types.Depsgraph, extent: float, s
     Raises ValueError, with a sentence, for an object that cannot be touched.
     """
     evaluated, linear, _ = evaluated_object(obj, depsgraph)
-    extent = extent or EXTENT_SHARE * size_of(evaluated, linear)
-    area = float(read_array(evaluated.data.polygons, "area").sum())
-    area *= abs(np.linalg.det(linear)) ** (2.0 / 3.0)
-    return min(len(evaluated.data.polygons), core.spaced_count(area, spacing or SPACING_SHARE * extent))
+    faces, extent = evaluated.data.polygons, extent or EXTENT_SHARE * size_of(evaluated, linear)
+    spacing = spacing or SPACING_SHARE * extent
+    area = float(read_array(faces, "area").sum()) * abs(np.linalg.det(linear)) ** (2.0 / 3.0)
+    count = min(len(faces), core.spaced_count(area, spacing))
+    if count > MOST_COUNTED:
+        return count
+    # Long or narrow faces have their middles where others leave no room, as on a letter.
+    middles = read_array(faces, "center", 3) @ linear.T
+    chosen = core.spaced(middles, spacing, np.random.default_rng(0))
+    return sum(index is not None for index in chosen)
 
 
 class StabilityMap:

@@ -91,6 +91,7 @@ def touch(
     require_single("patch", found.result.radius, found.result.frame.origin)
     report: TouchReport = {
         "source": obj.name,
+        "object_size": surface.size,
         "method": fit["method"],
         "noise": noise,
         "seed": seed,
@@ -115,7 +116,7 @@ def _explored(
     step: float,
     **more: Any,
 ) -> core.Exploration:
-    """What core.explore finds. Where facets are longer than some steps, an error says so."""
+    """What core.explore finds. Where long facets stand for a smooth bend, an error says so."""
     more |= {"farthest": FARTHEST_SHARE * surface.size, "most_planes": MOST_PLANES}
     try:
         return core.explore(
@@ -123,7 +124,10 @@ def _explored(
         )
     except core.DegenerateCurvesError as error:
         facet = surface.facet(point)
-        if more["noise"] or facet < LARGE_FACET * (step or FINEST_STEP * surface.size):
+        is_large = facet >= LARGE_FACET * (step or FINEST_STEP * surface.size)
+        if more["noise"] or not (
+            is_large and core.is_beside_bend(point, surface.face_near, surface.corners_of)
+        ):
             raise
         raise ValueError(
             f"{error}. The facets there are {length(facet)} long: add a Subdivision modifier if the "

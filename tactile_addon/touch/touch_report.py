@@ -14,6 +14,7 @@ from .types import Array, Point
 
 # The surface itself ends a curve in these ways.
 SURFACE_STOPS = (core.CREASE, core.NO_CONTACT, core.NOT_MONGE)
+RIM_POINTS = 48  # The deviation of the height is looked at in this many places of the boundary.
 AT_POINT = 1e-6  # A half curve that is shorter than this share of the radius ends at the point.
 
 
@@ -89,6 +90,7 @@ class TouchReport(TypedDict, total=False):
     degree: int
     axes: list[list[float]]  # (3, 3), see core.SamplingPlane.axes.
     seconds: dict[str, float]
+    object_size: float  # The longest edge of the bounding box.
     extent: float
     step: float
     noise: float
@@ -102,6 +104,7 @@ class TouchReport(TypedDict, total=False):
     given_contacts: int
     misses: list[float]  # How far the curves miss their common point.
 
+    height_std_rim: float  # The largest one on the boundary of the domain.
     area: float
     total_absolute_curvature: float
     condition_number: float
@@ -127,7 +130,7 @@ def ends(contours: Sequence[core.Contour], has_extent: bool) -> str:
     if not counts:
         return ""
     (first, most), *others = counts.most_common()
-    words = [f"{most} of {2 * len(contours)} half curves end {core.WHERE[first]}"]
+    words = [f"{most} of {2 * len(contours)} half curves ended {core.WHERE[first]}"]
     words += [f"{count} {core.WHERE[stop]}" for stop, count in others]
     return f" {', '.join(words)}{', before the extent' if has_extent else ''}."
 
@@ -180,7 +183,9 @@ def suggestion_report(result: core.Reconstruction, reference: Array) -> Suggeste
 
 def measures(result: core.Reconstruction) -> TouchReport:
     """The parts of a report that take long or matter only once a gesture has ended."""
+    rim = result.domain.boundary(RIM_POINTS)
     return {
+        "height_std_rim": float(result.height_std(*rim.T).max()),
         "area": result.domain.area,
         "total_absolute_curvature": result.total_absolute_curvature,
         "condition_number": result.condition_number,

@@ -3,7 +3,8 @@
 """Lengths and curvatures in words, in the unit in which the scene shows lengths."""
 
 import math
-from typing import TypeAlias
+from collections.abc import Mapping
+from typing import Any, TypeAlias
 
 import bpy
 
@@ -17,6 +18,7 @@ ADAPTIVE = {
 # Symbol and meters of each unit, by Blender's name.
 METERS = dict(zip((*ADAPTIVE["METRIC"], *ADAPTIVE["IMPERIAL"]), core.UNIT_METERS.items(), strict=True))
 LEAST = {"MILLIMETERS": 1e-2}  # In an adaptive unit lengths are at least 1 or this: few count micrometers.
+LEAST_NUMBER = 10.0  # The unit of a whole object suits this many tolerances.
 SUPERSCRIPTS = {1: "", 2: "²"}
 ROUNDING = 1e-3  # A value below this share of its standard deviation is rounding, and counts as 0.
 
@@ -31,11 +33,18 @@ def unit_of(scene: bpy.types.Scene, size: float) -> Unit:
         return "", 1.0
     name: str = settings.length_unit
     meters = size * settings.scale_length * (1.0 + 1e-6)
-    if name == "ADAPTIVE" or not 1e-1 <= meters / METERS[name][1] <= 1e4:
+    if name == "ADAPTIVE" or not 1e-2 <= meters / METERS[name][1] <= 1e4:
         names = ADAPTIVE[settings.system]
         name = next((n for n in names if LEAST.get(n, 1.0) * METERS[n][1] <= meters), names[-1])
     symbol, meters = METERS[name]
     return symbol, meters / settings.scale_length
+
+
+def unit_of_report(scene: bpy.types.Scene, report: Mapping[str, Any]) -> Unit:
+    """The unit of all numbers of a patch or of a whole object; the latter has lengths far below its radii."""
+    if "tolerance" not in report:
+        return unit_of(scene, report["radius"])
+    return unit_of(scene, LEAST_NUMBER * (report["tolerance"] or report["height_std"]))
 
 
 def say(value: float, power: int, unit: Unit, std: float | None = None) -> str:

@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from ... import core
+from ...core.arguments import many
 from .touch_report import Registration, SuggestedPlane, TouchReport
 from .units import Unit, known, length, say, unit_of
 
@@ -42,7 +43,11 @@ def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
         ("fit error (6)", _shared(report, "fit_error", unit)),
         ("standard deviation of the height", _shared(report, "height_std", unit)),
         ("mesh to patch", _verification(report, unit)),
-        *([("put onto", registration_summary(report["registration"]))] if "registration" in report else []),
+        *(
+            [("put onto", registration_summary(report["registration"], unit))]
+            if "registration" in report
+            else []
+        ),
         *_verified_rows(report.get("verification"), unit),
         ("suggested next plane", _suggestion(report["suggested_plane"], unit)),
         ("total |K| (8)", f"{report['total_absolute_curvature']:.4g}"),
@@ -82,7 +87,7 @@ def added_planes(report: TouchReport, unit: Unit) -> str:
 
 def _measured_contacts(report: TouchReport) -> str:
     numbers = [(report[kind], kind) for kind in ("curves", "strokes") if report[kind]]
-    kinds = " and ".join(f"{number} {kind[:-1] if number == 1 else kind}" for number, kind in numbers)
+    kinds = " and ".join(many(number, kind[:-1], kind) for number, kind in numbers)
     given, fitted = report.get("given_contacts", 0), report["contacts"]
     if given <= fitted:  # The point of the file is one more.
         return f"{fitted} on {kinds}"
@@ -108,11 +113,6 @@ def table(rows: Iterable[tuple[str, str]]) -> str:
     """Labels and values as aligned lines."""
     width = max(len(label) for label, _ in rows)
     return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
-
-
-def many(count: int, one: str, several: str) -> str:
-    """A count with its noun, as in "1 touch"."""
-    return f"{count} {one if count == 1 else several}"
 
 
 def sentence(error: Exception) -> str:
@@ -141,7 +141,7 @@ def _verification(report: TouchReport, unit: Unit) -> str:
         _shared(report, "vertex_distance_mean", unit),
         say(report["vertex_distance_max"], 1, unit),
     )
-    return f"mean {mean}; largest {farthest}; {report['vertices']} vertices"
+    return f"mean {mean}; largest {farthest}; {many(report['vertices'], 'vertex', 'vertices')}"
 
 
 def _verified_rows(found: Mapping[str, Any] | None, unit: Unit) -> list[tuple[str, str]]:
@@ -150,17 +150,19 @@ def _verified_rows(found: Mapping[str, Any] | None, unit: Unit) -> list[tuple[st
         return []
     names = [name for name in ("vertex", "contact") if f"{name}_distance_mean" in found]
     more = f"{say(found['extra_fit_error'], 1, unit)}, " if "extra_fit_error" in found else ""
+    points = many(found["extra_points"], "point", "points")
+    curves = many(found["extra_contours"], "curve", "curves")
     return [
         *((f"{name} distances", _spread(found, f"{name}_distance", unit)) for name in names),
-        ("(6) on more curves", f"{more}{found['extra_points']} points on {found['extra_contours']} curves"),
+        ("(6) on more curves", f"{more}{points} on {curves}"),
         ("overlap", f"{100.0 * found['overlap']:.0f} % of the area"),
     ]
 
 
-def registration_summary(found: Registration) -> str:
-    """A sentence on where a patch was put by registration."""
+def registration_summary(found: Registration, unit: Unit | None = None) -> str:
+    """A sentence on where a patch was put by registration, in this unit or in that of the residual."""
     residual = found["residuals"][found["pose"] - 1]
-    words = f'The contacts are {length(residual)} off "{found["target"]}" (root mean square)'
+    words = f'The contacts are {length(residual, unit)} off "{found["target"]}" (root mean square)'
     if not found["is_ambiguous"]:
         return words
     return f"{words}; others of its {len(found['residuals'])} poses are about as good"

@@ -21,6 +21,7 @@ from ..stability_map import map_object
 from ..touch import units
 from ..touch.touch_object import Touched, plane_axes
 from ..touch.types import Array, Object
+from ..touch.units import Unit
 from .free_view import free_strip
 
 # Each sampling plane has one of Okabe and Ito's colors, which color-blind readers can tell apart.
@@ -147,13 +148,15 @@ def draw_legend() -> None:
         shown = patch.tactile_colors
         low = 0.0 if shown in patch_record.POSITIVE else -1.0
         title = patch.bl_rna.properties["tactile_colors"].enum_items[shown].name
-        bar = _scale(context, title, record, record["radius"], patch_record.POWERS[shown], low)
+        unit = units.unit_of_report(context.scene, record)
+        bar = _scale(title, record, unit, patch_record.POWERS[shown], low)
         unknown = record.get("unknown_curvatures") if shown in CURVATURES else None
         _draw_box(context, *bar, [("Unknown", colors.UNKNOWN)] if unknown else ())
     elif obj is not None and patch_record.MAP_RECORD in obj and obj.visible_get():
         record, shown = obj[patch_record.MAP_RECORD], obj.tactile_map_colors
         title = obj.bl_rna.properties["tactile_map_colors"].enum_items[shown].name
-        bar = _scale(context, title, record, record["spacing"], map_object.MAP_POWERS[shown], 0.0)
+        unit = units.unit_of(context.scene, record["spacing"])
+        bar = _scale(title, record, unit, map_object.MAP_POWERS[shown], 0.0)
         if shown == REASON:
             bar = title, 0.0, []
         elif shown in map_object.REVERSED:
@@ -175,10 +178,9 @@ def _is_last_view(context: bpy.types.Context) -> bool:
 
 
 def _scale(
-    context: bpy.types.Context, title: str, record: Mapping[str, Any], size: float, power: int, low: float
+    title: str, record: Mapping[str, Any], unit: Unit, power: int, low: float
 ) -> tuple[str, float, list[tuple[float, str]]]:
     """The title with its unit, the share at which colors begin, and the (share, text) labels of a scale."""
-    unit = units.unit_of(context.scene, size)
     symbol = units.symbol(power, unit)
     top = record["color_limit"] / unit[1] ** power
     labels = [(at, f"{at * top:.3g}") for at in (low, 0.5 * (low + 1.0), 1.0)]

@@ -28,6 +28,7 @@ class BothWays:
 
     deviation : (n,), signed distances of the surface's vertices from the mesh, positive outside it
     mean : the mean distance of the surface from the mesh and of the mesh from the surface, by area
+    within : the smaller share of both areas, of surface and mesh, that is within the tolerance of the other
     largest, place : the largest distance of either from the other, and where that is, (3,)
 
     Places of the mesh that no finger could reach, because the mesh hides them, do not count.
@@ -37,7 +38,7 @@ class BothWays:
         """`target` is the DetachedMesh that was touched, and `mesh` the core.Mesh of what was felt."""
         self._target, self._mesh, self._tolerance = target, mesh, tolerance
         self.deviation = np.zeros(len(mesh.vertices))
-        self.mean, self.largest, self.place = 0.0, 0.0, mesh.vertices[0]
+        self.mean, self.within, self.largest, self.place = 0.0, 1.0, 0.0, mesh.vertices[0]
 
     def steps(self) -> Iterator[float]:
         """Does everything, as a generator that yields the share that is done."""
@@ -52,14 +53,16 @@ class BothWays:
         middles, off = (a + b + c) / 3.0, np.zeros(len(areas))
         yield 0.3
         yield from part_of(self._off_target(middles, normals, off), 0.3, 0.7)
-        there, places = np.average(np.abs(off), weights=areas), self._places()
+        there, places = np.abs(off), self._places()
         yield 0.7
         trees = yield from self._trees()
         back = []
         for points in places:
             off = yield from self._off_surface(points, trees)
-            back.append(off.mean() if len(off) else 0.0)
-        self.mean = 0.5 * float(there + back[0])
+            back.append(off if len(off) else np.zeros(1))
+        self.mean = 0.5 * float(np.average(there, weights=areas) + back[0].mean())
+        near = np.average(there <= self._tolerance, weights=areas), (back[0] <= self._tolerance).mean()
+        self.within = float(min(near))
 
     def _off_target(self, points: Array, normals: Array, off: Array) -> Generator[float, None, None]:
         """Fills in the signed distances (n,) of points (n, 3) of the surface; yields the share done."""

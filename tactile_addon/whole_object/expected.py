@@ -9,11 +9,10 @@ import bpy
 import numpy as np
 
 from ... import core
+from ...core.arguments import many
 from ..touch import units
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Object
-from ..touch.wording import many
-from .object_report import LEAST_NUMBER
 from .object_touches import tolerance_of
 
 TRIED, SEED = 12, 0  # The number of touches that are made for the estimate.
@@ -45,7 +44,7 @@ class Expected:
             touches, seconds = expected(self._mesh, tolerance, noise)
             self._given = given
             about = f"{many(touches, 'touch', 'touches')}, {_time(seconds)}"
-            unit = units.unit_of(context.scene, LEAST_NUMBER * tolerance)
+            unit = units.unit_of(context.scene, self._mesh.size)
             self._words = f"Tolerance {units.length(tolerance, unit)}: about {about}"
         return self._words
 

@@ -2,46 +2,50 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the panel and the shell say of a whole object."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import bpy
 import numpy as np
 
+from ...core.arguments import many
 from ..touch import units
 from ..touch.units import Unit
-from ..touch.wording import many, vector
+from ..touch.wording import vector
 
-LEAST_NUMBER = 10.0  # Lengths are in a unit that suits this many tolerances.
+# A surface is good if this share of it is within the tolerance of the mesh, and all within so many.
+WITHIN_SHARE, OFF_TOLERANCES = 0.99, 3.0
+FACETED = 0.5  # The panel says that curvatures are those of facets from this share of the area on.
 ZERO = 1e-6  # A distance below this share of the size counts as 0.
 
 
 def unit_of(record: Mapping[str, Any]) -> Unit:
-    """The unit of a report, which has lengths from below the tolerance to far above it."""
-    return units.unit_of(bpy.context.scene, LEAST_NUMBER * (record["tolerance"] or record["height_std"]))
+    """The unit of a report in the open scene."""
+    return units.unit_of_report(bpy.context.scene, record)
 
 
 def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(label, value) of everything there is to say of a whole object."""
     unit, off = unit_of(record), deviation(record, "mean")
-    how = (
-        many(record["touches"], "time", "times") if "touches" in record else f"{record['contacts']} contacts"
-    )
+    was_touched = "touches" in record
+    how = many(record["touches"], "time", "times") if was_touched else _contacts(record)
+    vertices = many(record["vertices"], "vertex", "vertices")
+    triangles = many(record["triangles"], "triangle", "triangles")
     return _known(
-        ("touched" if "touches" in record else "measured", f"{record['source']}, {how}"),
+        ("touched" if was_touched else "measured", f"{record['source']}, {how}"),
         ("verdict", verdict_of(record)),
         ("surface", _surface(record)),
         ("message", record["message"]),
+        ("agreement", agreement(record)),
+        ("facets", facets(record)),
         ("patches", f"{record['patches']}, of which {record['in_doubt']} alone would be in doubt"),
         ("edges of their graph", record["edges"]),
         ("tolerance", _tolerance(record)),
         ("standard deviation of the height", units.say(record["height_std"], 1, unit)),
         ("distance from the mesh", off and f"mean {off}; largest {deviation(record, 'max')}"),
         ("largest distance at", _place(record)),
-        (
-            "surface's mesh",
-            f"{record['vertices']} vertices, {record['triangles']} triangles, edges {_edge(record)}",
-        ),
+        ("surface's mesh", f"{vertices}, {triangles}, edges {_edge(record)}"),
         ("curvatures", _unknown(record)),
     )
 
@@ -55,7 +59,41 @@ def verdict_of(record: Mapping[str, Any]) -> str:
 
 def object_verdict(record: Mapping[str, Any]) -> str:
     """The verdict and what it rests on, for the panel."""
-    return f"{verdict_of(record)}. {record['message']}"
+    return " ".join(filter(None, (f"{verdict_of(record)}.", record["message"], agreement(record))))
+
+
+def is_all_within(record: Mapping[str, Any]) -> bool:
+    """Whether the verdict is good, and no place is farther off the mesh than the tolerance."""
+    return record["status"] == "ok" and record.get("deviation_max", 0.0) <= (record["tolerance"] or math.inf)
+
+
+def agreement(record: Mapping[str, Any]) -> str | None:
+    """How far surface and mesh agree, and how far they have to for a good verdict; None if that says nothing.
+
+    So it is without a mesh, and where touches could go on.
+    """
+    if "within" not in record or record["uncovered"]:
+        return None
+    unit, tolerance = unit_of(record), record["tolerance"]
+    share = within(record["within"], record["deviation_max"] <= tolerance)
+    return (
+        f"{share} of the surface is within the tolerance of {units.say(tolerance, 1, unit)}, and the "
+        f"farthest place is {deviation(record, 'max')} off. "
+        f"Good takes {100.0 * WITHIN_SHARE:g} % and at most {units.say(OFF_TOLERANCES * tolerance, 1, unit)}."
+    )
+
+
+def within(share: float, is_all: bool) -> str:
+    """The share of the area within the tolerance in words; it is rounded down."""
+    return "All" if is_all else f"{math.floor(1e3 * min(share, 0.999)) / 10.0:g} %"
+
+
+def facets(record: Mapping[str, Any]) -> str | None:
+    """A sentence if most curvatures are those of facets, as the verdict on a patch has it; or None."""
+    share = record.get("faceted", 0.0)
+    if share < FACETED:
+        return None
+    return f"Curvature of the facets, not of the shape, on {100.0 * share:.0f} % of the area"
 
 
 def object_summary(record: Mapping[str, Any]) -> str:
@@ -64,7 +102,7 @@ def object_summary(record: Mapping[str, Any]) -> str:
     if "touches" in record:
         touches, off = many(record["touches"], "touch", "touches"), deviation(record, "mean")
         return f"{verdict_of(record)}: {touches}; {_surface(record)}; {off} off the mesh on average"
-    patches = f"{record['patches']} patches of {record['contacts']} contacts"
+    patches = f"{many(record['patches'], 'patch', 'patches')} of {_contacts(record)}"
     return f"{verdict_of(record)}: {patches}; {_surface(record)}; ± {std}"
 
 
@@ -89,6 +127,10 @@ def object_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
 def _known(*rows: tuple[str, Any]) -> list[tuple[str, str]]:
     """The rows whose value is not None, in words."""
     return [(label, str(value)) for label, value in rows if value is not None]
+
+
+def _contacts(record: Mapping[str, Any]) -> str:
+    return many(record["contacts"], "contact", "contacts")
 
 
 def _surface(record: Mapping[str, Any]) -> str:

@@ -11,19 +11,18 @@ import bpy
 import numpy as np
 
 from ... import core
+from ...core.arguments import many
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.touch_object import AWAY, nearest_point
 from ..touch.types import Array, Object
 from ..touch.units import length
-from ..touch.wording import many
 from .both_ways import BothWays
-from .object_report import unit_of
+from .object_report import OFF_TOLERANCES, WITHIN_SHARE, unit_of, within
 from .whole_surface import WholeSurface
 
 # These lengths are shares of the object's size.
 TOLERANCE_SHARES = {"quick": 1.0 / 200.0, "normal": 1.0 / 500.0, "fine": 1.0 / 1250.0}
 LARGEST_TOLERANCE, LARGEST_EDGE = 0.1, 0.5  # With more, neither patches nor triangles would fit.
-OFF_TOLERANCES = 3.0  # The surface is no good if it is off the mesh by more tolerances, as in core's check.
 STARTS = 20  # The number of places to begin that are tried if none is given.
 PLACES, SEED = 1000, 0  # The progress is the share of this many places on the mesh that patches cover.
 TOUCHED, JOINED = 0.5, 0.8  # Of all that is to be done, touching and joining are done at these shares.
@@ -77,6 +76,7 @@ class ObjectTouches:
         self.is_stopped = self._is_cut_short = False
         self._left = self._spread()
         self._rounds, self._is_joining = 0, False
+        self._area = self._faceted = 0.0
         self._start = None
         if location is not None:
             at = np.subtract(location, self.surface.origin)
@@ -162,9 +162,14 @@ class ObjectTouches:
 
     def _note(self, state: core.Progress) -> None:
         for exploration, rim in zip(state.found, state.rims, strict=True):
-            self.found.append(exploration.result)
+            r = exploration.result
+            self.found.append(r)
             self.rims.append(rim)
-            covered = core.covered_by(exploration.result, rim, self._left, self.tolerance)
+            self._area += r.domain.area
+            self._faceted += r.domain.area * core.has_few_facets(
+                r, self.surface.face_near, self.surface.corners_of
+            )
+            covered = core.covered_by(r, rim, self._left, self.tolerance)
             self._left = self._left[~covered]
         self.done, self.uncovered = state.done, state.uncovered
         touches, places = many(state.done, "touch", "touches"), many(state.uncovered, "place", "places")
@@ -215,6 +220,8 @@ class ObjectTouches:
             "touches": self.done,
             "uncovered": len(self.whole.atlas.uncovered),
             **self.whole.report(),
+            "faceted": self._faceted / self._area,
+            "within": self.compared.within,
             "deviation_mean": self.compared.mean,
             "deviation_max": self.compared.largest,
             "deviation_place": (self.surface.origin + self.compared.place).tolist(),
@@ -230,6 +237,7 @@ class ObjectTouches:
     def _verdict(self, found: Mapping[str, Any]) -> tuple[str, str]:
         """The status and the message of what was found: those of its atlas, unless the mesh explains more."""
         status, message, unit = found["status"], found["message"], unit_of(found)
+        advice = "use a shorter edge length" if self.edge else "use a smaller tolerance"
         if found["uncovered"] and self._is_cut_short:
             places = many(found["uncovered"], "place", "places")
             return "uncertain", f"Touching was stopped, and the object goes on at {places}: touch it again."
@@ -244,10 +252,12 @@ class ObjectTouches:
                 )
             if status != "ok":
                 return status, f"The surface is up to {off} off the object. {message}"
-            advice = "use a shorter edge length" if self.edge else "use a smaller tolerance"
             return "uncertain", (
                 f"The surface is up to {off} off the object, which the tolerance does not explain: {advice}."
             )
+        if status == "ok" and self.compared.within < WITHIN_SHARE:
+            share = within(self.compared.within, False)
+            return "uncertain", f"Only {share} of surface and object agree to the tolerance: {advice}."
         if status == "ok" and found["height_std"] > self.tolerance:
             return "uncertain", (
                 f"Heights are accurate to {length(found['height_std'], unit)} on average, and the tolerance "

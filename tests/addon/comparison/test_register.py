@@ -123,9 +123,10 @@ def test_the_patch_of_a_probe_is_where_its_probe_is(empty, suzanne, extension):
     )
     found = {"target": "A", "pose": 1, "residuals": [0.1, 0.2], "is_ambiguous": False}
     assert report.registration_summary(found) == 'The contacts are 0.1 m off "A" (root mean square)'
+    assert "are 100 mm off" in report.registration_summary(found, ("mm", 1e-3))  # as all in the panel
     patch.parent = None
     depsgraph = empty.context.evaluated_depsgraph_get()
-    with pytest.raises(ValueError, match=r"poses on .* choose one of them"):
+    with pytest.raises(ValueError, match=r"The search has found 5 poses on .*: choose a lower number"):
         registration.register_patch(patch, suzanne, depsgraph, pose=99)
 
 

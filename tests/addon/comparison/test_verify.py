@@ -131,6 +131,21 @@ def test_patch_and_mesh_moved_turned_and_in_another_unit(empty, patch, scale):
     assert again["vertex_distance_mean"] == pytest.approx(other["vertex_distance_mean"], rel=0.02)
 
 
+def test_large_faces_contradict_a_patch_too(empty, extension):
+    """None of the plane's vertices is over the patch, and all of it is off the plane."""
+    empty.ops.mesh.primitive_plane_add(size=10.0)
+    assert empty.ops.tactile.reconstruct(target="Plane", location=(0.0, 0.0, 0.0), extent=0.6) == {"FINISHED"}
+    patch = empty.context.object
+    verified(empty, patch)
+    verdict = extension.tactile_addon.touch.wording.verdict
+    assert verdict(patch["tactile"], ("m", 1.0)).startswith("Good: heights to")
+    patch.location.z += 0.05
+    empty.context.view_layer.update()
+    assert verified(empty, patch)["vertices"] == 0
+    assert patch["tactile"]["message"].startswith("The mesh is 8.33 % of the radius off the patch on average")
+    assert verdict(patch["tactile"], ("m", 1.0)).startswith("Doubtful: ")
+
+
 def test_a_patch_moved_off_its_mesh(empty, patch):
     patch.matrix_world = Matrix.Translation(0.05 * patch.matrix_world.col[2].xyz) @ patch.matrix_world
     empty.context.view_layer.update()

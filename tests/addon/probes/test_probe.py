@@ -797,8 +797,9 @@ def test_the_legend_has_the_range_of_the_colors_in_the_unit_of_the_scene(
     patch.tactile_colors = shown
     record, label = report_of(patch), patch.bl_rna.properties["tactile_colors"].enum_items[shown].name
     lowest = 0.0 if shown in addon.scene.patch_record.POSITIVE else -1.0
+    unit = addon.touch.units.unit_of_report(empty.context.scene, record)
     said, begin, labels = addon.viewport.overlay._scale(
-        empty.context, label, record, record["radius"], addon.scene.patch_record.POWERS[shown], lowest
+        label, record, unit, addon.scene.patch_record.POWERS[shown], lowest
     )
     assert (said, begin) == (title, low)
     top = record["color_limit"] * 1000.0**power

@@ -56,7 +56,7 @@ def test_patches_share_a_range_and_may_be_given_one(empty, ball):
     empty.ops.tactile.reconstruct(target="Distant", location=(9, 0, 1), extent=0.4)
     assert empty.context.object["tactile"]["color_limit"] < own[1]  # Another object has a range of its own.
     empty.context.view_layer.objects.active = patches[0]
-    assert empty.ops.tactile.share_range() == {"FINISHED"}  # and says: 2 patches have one range of colors
+    assert empty.ops.tactile.share_range() == {"FINISHED"}  # and says: One range of colors for 2 patches
     assert [patch["tactile"]["color_limit"] for patch in patches] == [max(own)] * 2
     assert empty.data.objects["Distant Patch"]["tactile"]["color_limit"] == max(own)
     assert "tactile_color_range" not in other
@@ -143,6 +143,19 @@ def test_a_flat_patch_has_a_rim_that_lies_in_it(empty):
     assert np.diff(angles).max() < math.radians(10.0)
     assert np.hypot(*rim[:, :2].T).min() > 0.3
     assert np.abs(rim[:, 2]).max() < 0.01
+
+
+def test_the_range_of_a_flat_patch_follows_what_is_significant(empty):
+    """Beside a corner a patch is small and its curvature unknown, but it is as flat as any other."""
+    empty.ops.mesh.primitive_cube_add()
+    ranges = []
+    for location in ((0.997, 0.997, 1.0), (0.1, 0.2, 1.0)):
+        patch = touch(empty, location, target="Cube", extent=0.0)
+        ranges.append(patch["tactile"]["own_limit"])
+    assert ranges == pytest.approx([1e-3 / 2.0**2] * 2)
+    noisy = touch(empty, (-0.1, 0.2, 1.0), target="Cube", noise=1e-3)
+    largest = np.abs(values(noisy.data, "gaussian_curvature")).max()
+    assert noisy["tactile"]["own_limit"] >= 2.0 * noisy["tactile"]["gaussian_curvature_std"] > largest > 0.0
 
 
 def test_a_map_is_above_its_mesh_and_below_patches(empty, ball):

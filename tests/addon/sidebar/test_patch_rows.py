@@ -67,6 +67,13 @@ def test_the_verdict_says_what_limits_a_good_patch(wording, empty):
     assert wording.verdict(report, UNIT) == "Good, with all half curves cut short at a crease"
 
 
+def test_the_deviation_at_the_rim_stands_below_the_mean(said, ball):
+    rows = dict(said.main_rows(ball[1], UNIT))
+    mean, rim = (float(rows[key].split()[1]) for key in ("Height", "At the Rim"))
+    assert 1.5 < rim / mean < 10.0
+    assert dict(said.main_rows({**ball[1], "height_std_rim": 0.04}, UNIT))["At the Rim"] == "± 0.04 mm"
+
+
 @pytest.mark.parametrize("status", ["uncertain", "not_converged"])
 def test_the_verdict_says_what_to_do_where_there_is_doubt(wording, status):
     message = (
@@ -172,6 +179,16 @@ def test_a_map_knows_about_how_many_points_it_will_touch(extension, empty):
     assert expected == pytest.approx(empty.context.object["tactile_map"]["points"], rel=0.1)
 
 
+def test_a_map_counts_no_faces_whose_middles_leave_no_room_for_each_other(extension, empty):
+    """The caps of a cylinder of 128 faces are one face each, and its sides are long and narrow."""
+    empty.ops.mesh.primitive_cylinder_add(vertices=128)
+    depsgraph = empty.context.evaluated_depsgraph_get()
+    count = extension.tactile_addon.stability_map.stability.expected_count
+    expected = count(empty.context.object, depsgraph, 0.0, 0.0)
+    empty.ops.tactile.stability_map()
+    assert expected == pytest.approx(empty.context.object["tactile_map"]["points"], rel=0.1)
+
+
 def test_lengths_in_messages_are_in_the_unit_of_the_scene(extension, empty):
     empty.ops.mesh.primitive_cube_add(size=0.05)
     empty.context.scene.unit_settings.length_unit = "MILLIMETERS"
@@ -179,6 +196,20 @@ def test_lengths_in_messages_are_in_the_unit_of_the_scene(extension, empty):
         empty.ops.tactile.pick(target="Cube", location=(0.0, 0.0, 0.025), extent=0.2)
     with pytest.raises(RuntimeError, match=r"got nan mm, 0 mm and 0 mm"):
         empty.ops.tactile.pick(target="Cube", location=(0.0, 0.0, 0.025), extent=float("nan"))
+
+
+def test_panels_have_the_unit_that_fields_have(extension, empty):
+    """In the default scene fields show meters. Far smaller lengths would be long numbers in them."""
+    units, scene = extension.tactile_addon.touch.units, empty.context.scene
+    assert scene.unit_settings.length_unit == "METERS"
+    assert [units.unit_of(scene, size)[0] for size in (5.0, 0.05, 0.012, 0.005)] == ["m", "m", "m", "mm"]
+    record = {"radius": 0.01, "tolerance": 2e-4, "height_std": 1e-5, "color_limit": 4800.0}
+    assert extension.tactile_addon.whole_object.object_report.unit_of(record)[0] == "mm"
+    empty.ops.mesh.primitive_cube_add()
+    empty.context.object["tactile_object"] = record
+    ranges = extension.tactile_addon.scene.color_range
+    assert ranges.unit_of_range(empty.context.object, scene)[1][0] == "mm"  # as the numbers below it
+    assert empty.context.object.tactile_range == pytest.approx(0.0048)
 
 
 class Layout:
@@ -269,3 +300,23 @@ def test_the_numbers_of_an_earlier_touch_are_gray_below_a_title(extension, empty
     texts = [text for text, _ in drawn()]
     assert texts.index("Last Touch") < texts.index("κ1")
     assert not any(dict(drawn())[name] for name in numbers)
+
+
+def test_a_single_thing_is_not_said_in_the_plural(extension, empty):
+    addon = extension.tactile_addon
+    found = {"target": "Cube", "vertices": 1, "overlap": 1.0, "extra_points": 9}
+    found |= {"vertex_distance_mean": 0.5, "vertex_distance_max": 0.5}
+    report = {"status": "ok", "radius": 1.0, "verification": found}
+    wording = addon.comparison.verification_wording
+    words = wording.verification_summary(report)[1]
+    assert words.startswith('At 1 vertex, "Cube" is 0.5 m off the patch on average')
+    found["vertices"] = 2
+    assert wording.verification_summary(report)[1].startswith('At 2 vertices, "Cube" is')
+    measured = {"status": "ok", "is_closed": True, "patches": 1, "contacts": 1, "height_std": 0.1}
+    measured |= {"tolerance": None, "radius": 1.0}
+    assert "1 patch of 1 contact;" in addon.whole_object.object_report.object_summary(measured)
+    made = addon.stability_map.map_report.map_table_rows(
+        {"source": "Cube", "touched": 1, "points": 1, "patches": 1, "in_doubt": 0, "refused": {}}
+        | {"method": "bayes", "degree": "auto", "spacing": 1.0, "extent": 1.0, "step": 0.1}
+    )
+    assert dict(made)["touched"] == "Cube, at 1 of 1 point"

@@ -28,7 +28,7 @@ def report_of(bpy, location, **arguments):
 
 def test_a_patch_of_a_given_extent_says_where_its_curves_ended_before(empty, cube):
     message = report_of(empty, (0.9, 0.2, 1.0), extent=0.5)["message"]
-    assert message.endswith(" 3 of 6 half curves end at a crease, before the extent.")
+    assert message.endswith(" 3 of 6 half curves ended at a crease, before the extent.")
     assert "half curves" not in report_of(empty, (0.1, 0.2, 1.0), extent=0.5)["message"]
 
 
@@ -100,6 +100,16 @@ def test_a_touch_that_fails_on_facets_names_them_and_the_modifier(empty, monkey)
     words = r"The facets there are [\d.]+ \w*m long: add a Subdivision modifier if the mesh stands"
     with pytest.raises(RuntimeError, match=words):
         empty.ops.tactile.reconstruct(target="Suzanne", location=corner)
+
+
+@pytest.mark.parametrize("scale", [(1.0, 1.0, 1.0), (1.0, 0.7, 0.04)])
+def test_no_subdivision_is_advised_where_nothing_is_round(empty, cube, scale):
+    cube.scale = scale
+    empty.context.view_layer.update()
+    corner = Vector((0.999, 0.999, 0.999)) * cube.scale
+    with pytest.raises(RuntimeError, match="it needs besides the reference point") as caught:
+        empty.ops.tactile.pick(target="Cube", location=corner)
+    assert "Subdivision" not in str(caught.value)
 
 
 def test_a_crease_of_a_fine_mesh_is_none_between_facets(empty, cube):

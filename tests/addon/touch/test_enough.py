@@ -104,7 +104,7 @@ def test_while_a_gesture_goes_on_the_extent_is_that_of_its_end(empty, sheet, ext
     assert (going["extent"], going["message"]) == (ended["extent"], ended["message"])
     stops = {stop for pair in going["stops"] for stop in pair}
     assert stops == {"fit no longer matched", "no contact"}
-    assert re.search(r" \d of 6 half curves end (at|where) .*, \d (at|where) .*\.$", ended["message"])
+    assert re.search(r" \d of 6 half curves ended (at|where) .*, \d (at|where) .*\.$", ended["message"])
 
 
 def test_the_shell_asks_for_planes_too(command, files):

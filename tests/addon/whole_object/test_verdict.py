@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is said of a whole object is true of the mesh that is shown, and of the mesh that was touched."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -49,8 +50,10 @@ def test_a_cube_is_a_cube_with_sharp_edges(empty, extension):
     assert (record["status"], record["message"], record["is_closed"]) == ("ok", OK, True)
     assert record["deviation_max"] < 1e-5
     report = extension.tactile_addon.whole_object.object_report
-    assert report.object_verdict(record) == f"Good. {OK}"
-    assert dict(report.object_rows(record))["Off the Mesh"] == "0 cm"
+    agreement = "All of the surface is within the tolerance of 0.004 m, and the farthest place is 0 m off."
+    assert report.object_verdict(record) == f"Good. {OK} {agreement} Good takes 99 % and at most 0.012 m."
+    assert report.is_all_within(record)
+    assert dict(report.object_rows(record))["Off the Mesh"] == "0 m"
     mesh = surface.data
     ends = np.array([edge.vertices for edge in mesh.edges])[values(mesh, "sharp_edge").astype(bool)]
     at_faces = np.isclose(np.abs(positions(mesh)), 1.0, atol=1e-5).sum(axis=1)
@@ -129,6 +132,51 @@ def test_what_touches_bridge_is_reported(empty, extension, ball, touches_of):
     assert touches.report()["message"].endswith(open_edges)
     touches.edge = 0.5
     assert touches.report()["message"].endswith(f"{advice} a shorter edge length.")
+
+
+def test_the_verdict_says_how_much_is_within_the_tolerance(empty, extension, ball, touches_of):
+    """A cap of 2 % of the ball is two tolerances off the surface: no place is too far off, but too many."""
+    touches = touches_of(ball, tolerance=0.02)
+    for _ in touches.steps():
+        pass
+    for vertex in ball.data.vertices:
+        if vertex.co.z > 1.92:
+            vertex.co *= 1.02
+    ball.data.update()
+    empty.context.view_layer.update()
+    object_report = extension.tactile_addon.whole_object.object_report
+    assert object_report.is_all_within(touches.report())
+    touches.compared = extension.tactile_addon.whole_object.both_ways.BothWays(
+        touches_of(ball).surface, touches.whole.mesh, touches.tolerance
+    )
+    list(touches.compared.steps())
+    report = touches.report()
+    assert 0.97 < report["within"] < 0.985
+    assert 0.03 < report["deviation_max"] < 0.06
+    only = r"Only 9[78][.\d]* % of surface and object agree to the tolerance: use a smaller tolerance."
+    assert re.fullmatch(only, report["message"])
+    words = object_report.object_verdict(report)
+    assert re.search(
+        r"Doubtful\. .* 9[78][.\d]* % of the surface is within the tolerance of 0\.02 m, and the", words
+    )
+    assert words.endswith("m off. Good takes 99 % and at most 0.06 m.")
+    assert not object_report.is_all_within(report | {"status": "ok"})  # So there is no tick.
+
+
+def test_a_whole_object_of_facets_says_that_its_curvature_is_theirs(empty, extension):
+    report = extension.tactile_addon.whole_object.object_report
+    empty.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
+    source = empty.context.object
+    _, record = touched(empty, most=4)
+    assert report.object_verdict(record) == f"Incomplete. {record['message']}"
+    assert report.facets(record) == "Curvature of the facets, not of the shape, on 100 % of the area"
+    assert dict(report.object_table_rows(record))["facets"] == report.facets(record)
+    assert empty.ops.tactile.add_subdivision() == {
+        "FINISHED"
+    }  # and says that it is subdivided: touch it all over again
+    assert [(m.type, m.levels) for m in source.modifiers] == [("SUBSURF", 3)]
+    empty.context.view_layer.objects.active = source
+    assert report.facets(touched(empty, most=4)[1]) is None
 
 
 @pytest.mark.long

@@ -274,9 +274,9 @@ def test_contacts_off_the_surface_put_it_in_doubt(ball):
     off = ways * np.where(np.arange(50) < 2, 1.02, 1.0)[:, None]
     wrong = replace(ball, check=Check(off, ways, np.zeros((0, 3)), len(off)))
     assert wrong.contradicting.tolist() == [True, True] + 48 * [False]
-    assert wrong.message.startswith("2 of 50 rays from outside meet something else than the surface")
+    assert wrong.message.startswith("2 of 50 rays from outside met something else than the surface")
     missed = replace(ball, check=Check(ways[:49], ways[:49], ways[49:], 49))
-    assert missed.message.startswith("1 of 50 rays from outside meet something else")
+    assert missed.message.startswith("1 of 50 rays from outside met something else")
     shifted = ways * np.where(np.arange(50) < 20, 1.004, 1.0)[:, None]
     loose = replace(ball, check=Check(shifted, ways, np.zeros((0, 3)), len(shifted)))
     assert not loose.contradicting.any()

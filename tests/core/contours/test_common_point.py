@@ -124,7 +124,7 @@ ACROSS = LINE[:, [1, 0, 2]]
         ([LINE, ACROSS + 30 * AHEAD], "the curves do not come near each other"),
         ([LINE, LINE + 0.1 * UP], "the curves run in the same direction"),
         ([LINE, LINE + 0.5 * RIGHT], "the curves run in the same direction"),
-        ([LINE, np.ones((9, 3))], "curve 2 has 1 contacts"),
+        ([LINE, np.ones((9, 3))], "curve 2 has 1 contact, and 4"),
     ],
 )
 def test_curves_without_a_common_point_are_refused_with_a_sentence(given, words):

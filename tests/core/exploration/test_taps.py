@@ -88,7 +88,7 @@ def test_a_hole_that_no_curve_crosses_leaves_the_touch_in_doubt():
         "add sampling planes. "
     )
     assert r.taps.missed > DOUBTFUL_GAP * r.taps.number
-    assert f" {r.taps.missed} of {r.taps.number} taps between the curves feel no surface." in r.message
+    assert f" At {r.taps.missed} of {r.taps.number} taps between the curves there is no surface." in r.message
 
 
 def test_a_point_on_an_edge_gets_the_advice_to_move_away():
@@ -134,7 +134,7 @@ def test_a_small_hole_is_reported_and_is_no_doubt():
     assert r.status == "ok"
     assert r.message.startswith("The patch describes its contacts. ")
     assert 0 < r.taps.missed <= DOUBTFUL_GAP * r.taps.number
-    assert f" {r.taps.missed} of {r.taps.number} taps between the curves feel no surface." in r.message
+    assert f" At {r.taps.missed} of {r.taps.number} taps between the curves there is no surface." in r.message
 
 
 @pytest.mark.parametrize("turn", [0.0, 10.0, 20.0, 30.0])
