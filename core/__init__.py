@@ -7,6 +7,7 @@ has negative curvatures, because normals point outward.
 """
 
 from .atlas.boundaries import Edge
+from .atlas.curvature import vertices_shown
 from .atlas.expected import covered_by, expected_touches
 from .atlas.measured import atlas_of, cover_contacts
 from .atlas.meshing import Mesh, shortest_edge
@@ -111,5 +112,6 @@ __all__ = [
     "track",
     "verify",
     "verifying",
+    "vertices_shown",
     "with_height_stds",
 ]

@@ -8,10 +8,12 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ... import core
+from ..touch.arrays import read_array
 from ..touch.touch_report import TouchReport
-from ..touch.types import Object
+from ..touch.types import Array, Object
 from . import colors
-from .attributes import COLOR, CURVATURE_STD, CURVATURES
+from .attributes import COLOR, CURVATURE_STD, CURVATURES, POSITION
 from .mesh_data import ABOVE, own_mesh, values
 from .patch_record import (
     ATLAS_RECORD,
@@ -35,7 +37,8 @@ ALIKE = 0.5  # Patches overlap only if the cosine between their normals is more.
 def recolor(obj: Object) -> None:
     """Colors a patch or whole object by the quantity it is set to show, and keeps the range in its record.
 
-    What is unknown of a whole object is gray, and does not count in the range.
+    What is unknown of a whole object does not count in the range. Beside creases it is as on the same wall,
+    or gray if the wall is narrow.
     """
     own_mesh(obj)
     shown, mesh = obj.tactile_colors, obj.data
@@ -48,8 +51,11 @@ def recolor(obj: Object) -> None:
         floor = max(floor, LEAST_SHARE * float(np.median(curvedness)) ** 2)
     record["own_limit"] = colors.symmetric_range(np.delete(shades, unknown), floor)
     limit = obj.get(RANGE) or max(record["own_limit"], obj.get(COMMON_RANGE, 0.0))
-    rgba = colors.diverging(shades, limit, unknown)
-    mesh.attributes[COLOR].data.foreach_set("color", rgba.ravel())
+    rgba = colors.diverging(np.append(shades, 0.0), limit, [len(shades)])
+    is_whole = ATLAS_RECORD in obj
+    at = _corners_shown(mesh, unknown, record["edge"]) if is_whole else np.arange(len(shades))
+    mesh.attributes[COLOR].data.foreach_set("color", rgba[at].ravel())
+    record["is_gray"] = bool((at < 0).any())
     if mesh.color_attributes.active_color_name != COLOR or mesh.color_attributes.default_color_name != COLOR:
         mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
     mesh.update()
@@ -59,6 +65,15 @@ def recolor(obj: Object) -> None:
 def _unknown(mesh: bpy.types.Mesh) -> Any:
     """The indices of the vertices whose curvatures are unknown; a patch has none."""
     return np.flatnonzero(np.isinf(values(mesh, CURVATURE_STD))) if CURVATURE_STD in mesh.attributes else []
+
+
+def _corners_shown(mesh: bpy.types.Mesh, unknown: Any, edge: float) -> Array:
+    """The vertex whose color each corner of the faces has, (k,), and -1 where it is gray."""
+    known = np.ones(len(mesh.vertices), dtype=bool)
+    known[unknown] = False
+    normals, facing = read_array(mesh.vertices, "normal", 3), read_array(mesh.corner_normals, "vector", 3)
+    corners = read_array(mesh.loops, "vertex_index", dtype=np.int32)
+    return core.vertices_shown(values(mesh, POSITION), normals, known, corners, facing, edge)
 
 
 def settle(patch: Object) -> None:

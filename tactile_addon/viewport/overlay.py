@@ -14,7 +14,7 @@ from gpu_extras.batch import batch_for_shader
 
 from ..probes import probe
 from ..scene import colors, patch_record
-from ..scene.attributes import CURVATURES, REASON
+from ..scene.attributes import REASON
 from ..scene.contour_mesh import RIM_CORNERS
 from ..scene.viewports import shows_colors
 from ..stability_map import map_object
@@ -147,7 +147,7 @@ def draw_legend() -> None:
         low = 0.0 if shown in patch_record.POSITIVE else -1.0
         title = patch.bl_rna.properties["tactile_colors"].enum_items[shown].name
         bar = _scale(context, title, record, record["radius"], patch_record.POWERS[shown], low)
-        unknown = record.get("unknown_curvatures") if shown in CURVATURES else None
+        unknown = record.get("is_gray")
         _draw_box(context, *bar, [("Unknown", colors.UNKNOWN)] if unknown else ())
     elif obj is not None and patch_record.MAP_RECORD in obj and obj.visible_get():
         record, shown = obj[patch_record.MAP_RECORD], obj.tactile_map_colors
