@@ -38,7 +38,7 @@ from .paper.by_method import SOLVERS
 from .patch.domain import Domain
 from .patch.geometry import Geometry, distances, fit_error, overlapped
 from .patch.monge import MongePatch
-from .reconstruction.deviations import mean_height_stds, with_height_stds
+from .reconstruction.deviations import gaussian_curvature_stds, mean_height_stds, with_height_stds
 from .reconstruction.from_contours import reconstruct, reconstruct_many
 from .reconstruction.next_plane import azimuth_of, suggest_plane
 from .reconstruction.options import METHODS
@@ -92,6 +92,7 @@ __all__ = [
     "exploring_many",
     "fit_error",
     "from_dict",
+    "gaussian_curvature_stds",
     "has_few_facets",
     "height_error",
     "in_running_order",

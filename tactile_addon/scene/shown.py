@@ -13,7 +13,7 @@ from ..touch.arrays import read_array
 from ..touch.touch_report import TouchReport
 from ..touch.types import Array, Object
 from . import colors
-from .attributes import COLOR, CURVATURE_STD, CURVATURES, POSITION
+from .attributes import COLOR, CURVATURE_STD, CURVATURES, GAUSSIAN_STD, POSITION
 from .mesh_data import ABOVE, own_mesh, values
 from .patch_record import (
     ATLAS_RECORD,
@@ -50,7 +50,8 @@ def recolor(obj: Object) -> None:
         # |K| is at most the square of the curvedness. Far below that, as on a cylinder, it is as good as 0.
         floor = max(floor, LEAST_SHARE * float(np.median(curvedness)) ** 2)
     record["own_limit"] = colors.symmetric_range(np.delete(shades, unknown), floor)
-    limit = obj.get(RANGE) or max(record["own_limit"], obj.get(COMMON_RANGE, 0.0))
+    common = max(obj.get(COMMON_RANGE, 0.0), _least_range(mesh, shown, unknown))
+    limit = obj.get(RANGE) or max(record["own_limit"], common)
     rgba = colors.diverging(np.append(shades, 0.0), limit, [len(shades)])
     is_whole = ATLAS_RECORD in obj
     at = _corners_shown(mesh, unknown, record["edge"]) if is_whole else np.arange(len(shades))
@@ -60,6 +61,13 @@ def recolor(obj: Object) -> None:
         mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
     mesh.update()
     record["color_limit"] = limit
+
+
+def _least_range(mesh: bpy.types.Mesh, shown: str, unknown: Any) -> float:
+    """The range below which colors would show the errors of K, which is no range of other patches."""
+    if shown != "gaussian_curvature" or GAUSSIAN_STD not in mesh.attributes:
+        return 0.0
+    return colors.least_range(*(np.delete(values(mesh, name), unknown) for name in (shown, GAUSSIAN_STD)))
 
 
 def _unknown(mesh: bpy.types.Mesh) -> Any:
