@@ -7,6 +7,7 @@ has negative curvatures, because normals point outward.
 """
 
 from .atlas.boundaries import Edge
+from .atlas.curvature import vertices_shown
 from .atlas.expected import covered_by, expected_touches
 from .atlas.measured import atlas_of, cover_contacts
 from .atlas.meshing import Mesh, shortest_edge
@@ -37,7 +38,7 @@ from .paper.by_method import SOLVERS
 from .patch.domain import Domain
 from .patch.geometry import Geometry, distances, fit_error, overlapped
 from .patch.monge import MongePatch
-from .reconstruction.deviations import mean_height_stds, with_height_stds
+from .reconstruction.deviations import gaussian_curvature_stds, mean_height_stds, with_height_stds
 from .reconstruction.from_contours import reconstruct, reconstruct_many
 from .reconstruction.next_plane import azimuth_of, suggest_plane
 from .reconstruction.options import METHODS
@@ -91,6 +92,7 @@ __all__ = [
     "exploring_many",
     "fit_error",
     "from_dict",
+    "gaussian_curvature_stds",
     "has_few_facets",
     "height_error",
     "in_running_order",
@@ -112,5 +114,6 @@ __all__ = [
     "track",
     "verify",
     "verifying",
+    "vertices_shown",
     "with_height_stds",
 ]

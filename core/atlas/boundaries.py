@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..patch.monge import TERMS, derived_monomials
+from ..reconstruction.deviations import gaussian_curvature_stds
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import polynomial_dict
 from .charts import MARGIN, Charts
@@ -21,10 +21,6 @@ from .finger import FACING
 
 # Boundaries are looked for on this many rays from each patch's middle, at this many places.
 RAYS, RAY_PLACES = 32, 16
-# Surfaces have terms beyond a sextic's, which count more and more outward: at a radius from the middle the
-# deviation of K is larger by the exponential of this (python -m benchmarks.atlas).
-OUTWARD_STD = 1.3
-SLOPES_AND_BENDS = (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)  # Curvatures follow from these derivatives.
 
 
 class Edge(NamedTuple):
@@ -81,26 +77,9 @@ def edges_of(charts: Charts) -> Generator[float, None, list[Edge]]:
 
 
 def gaussian_curvature_of(r: Reconstruction, points: Array) -> tuple[Array, Array]:
-    """K of a patch's polynomial at points (m, 3) on it, (m,), and standard deviations (m,), in 1/length^2.
-
-    The deviation follows from the gradient of K in the coefficients and, since that does not suffice at a
-    rim, from the second-order variance of z_xx z_yy - z_xy^2 for normally distributed second derivatives.
-    """
-    x, y, _ = ((points - r.frame.origin) @ r.frame.axes).T
-    by = np.swapaxes(derived_monomials(x / r.radius, y / r.radius, TERMS, SLOPES_AND_BENDS), 1, 2)
-    derivatives, covariance = by @ r.posterior.polynomial, r.posterior.covariance
-    zx, zy, zxx, zxy, zyy = derivatives[:, :, None]
-    steep = 1.0 + zx**2 + zy**2
-    k = (zxx * zyy - zxy**2) / steep**2
-    gradient = (zyy * by[2] + zxx * by[4] - 2.0 * zxy * by[3]) / steep**2
-    gradient -= 4.0 * k / steep * (zx * by[0] + zy * by[1])
-    first = np.einsum("mi,ij,mj->m", gradient, covariance, gradient)
-    c = np.einsum("ami,ij,bmj->abm", by[2:], covariance, by[2:])
-    second = c[0, 0] * c[2, 2] + c[0, 2] ** 2 + 2.0 * c[1, 1] ** 2 - 4.0 * c[0, 1] * c[1, 2]
-    variance = first + second / steep[:, 0] ** 4
-    curvature = r.patch.derivatives(x, y).gaussian_curvature
-    wider = np.exp(OUTWARD_STD * (x**2 + y**2) / r.radius**2)
-    return curvature, wider * np.sqrt(np.maximum(variance, 0.0)) / r.radius**2
+    """K of a patch's polynomial at points (m, 3) on it, (m,), and standard deviations (m,), in 1/length^2."""
+    x, y, _ = r.frame.to_local(points).T
+    return r.patch.gaussian_curvature(x, y), gaussian_curvature_stds(r, x, y)
 
 
 def _crossings(

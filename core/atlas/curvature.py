@@ -10,6 +10,7 @@ squares. For a ball that is exact at any width; heights would need terms beyond 
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..triangles import LEAST_DIVISOR, normalized, triangle_cross
@@ -25,6 +26,7 @@ TURNED = 0.966  # Normals on both sides of a crease are turned by 15 degrees, ha
 # Places are on one sheet if the cosine between their normals is more, and if the sum of both has at most the
 # share ACROSS of the way between them, which is 0 on a ball.
 LEAST_COSINE, ACROSS = 0.5, 0.5
+BESIDE, CANDIDATES = 3.0, 16  # Beside a crease a wall is shown as at one of 16 vertices within 3 LEAST edges.
 BY_STD, BY_MISFIT = 0.9, 0.4  # The shares of the surface's deviation and of the misfit in that of H.
 LEAST_SQUARE = 1e-9  # So much, in unit radius, is added to the squares, because places may be in a row.
 
@@ -121,6 +123,32 @@ def _neighborhoods(
     plane = np.stack([x, np.cross(normals, x)], axis=2)
     same = alike & (across <= ACROSS * distance)
     return np.where(same, distance, np.inf), np.concatenate([off @ plane, ups @ plane], axis=2)
+
+
+def vertices_shown(
+    points: Array, normals: Array, known: NDArray[np.bool_], corners: Indices, facing: Array, edge: float
+) -> Indices:
+    """For each corner of a mesh's faces the vertex whose curvatures its wall has there, (k,); -1 for none.
+
+    Where they are unknown, beside a crease, it is the nearest vertex whose normal is most like the corner's.
+
+    points, normals, known : (n, 3), (n, 3) and (n,), the vertices, and whether their curvatures are known
+    corners, facing : (k,) and (k, 3), the vertices at the corners, and the normals of their faces there
+    edge : the length of the mesh's edges
+    """
+    from scipy.spatial import cKDTree
+
+    found = np.where(known[corners], corners, -1)
+    some, places = np.flatnonzero(found < 0), np.flatnonzero(known)
+    if len(some) and len(places):
+        tree, reach = cKDTree(points[places]), BESIDE * LEAST * edge
+        away, at = tree.query(points[corners[some]], CANDIDATES, distance_upper_bound=reach)
+        at = places[np.minimum(at, len(places) - 1)]
+        cosine = np.where(np.isfinite(away), np.einsum("kbi,ki->kb", normals[at], facing[some]), -1.0)
+        most = cosine.max(axis=1)
+        nearest = np.argmax(cosine >= np.minimum(most, TURNED)[:, None], axis=1)
+        found[some] = np.where(most > LEAST_COSINE, at[np.arange(len(some)), nearest], -1)
+    return found
 
 
 def _fit_weingarten(distance: Array, local: Array, radius: Array) -> tuple[Array, Array, Array]:

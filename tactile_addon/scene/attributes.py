@@ -7,6 +7,9 @@ from typing import Any
 import bpy
 
 DOMAIN: Any = "POINT"  # Each vertex has a value.
+CORNERS: Any = (
+    "CORNER"  # Each corner of a face has a color, as on whole objects, whose walls meet at creases.
+)
 POSITION = "position"  # Blender's own.
 CURVATURES = ("gaussian_curvature", "mean_curvature", "shape_index", "curvedness")
 # Those of a whole object have deviations, too, which are infinite where its curvatures are unknown.
@@ -34,8 +37,8 @@ KEYS = {
 }
 
 
-def attribute_of(mesh: bpy.types.Mesh, name: str) -> Any:
-    """The attribute of this name, or None if there is none with its type and domain."""
+def attribute_of(mesh: bpy.types.Mesh, name: str, domain: Any = DOMAIN) -> Any:
+    """The attribute of this name, or None if there is none with its type and this domain."""
     found: Any = mesh.attributes.get(name)
-    is_one = found is not None and (found.data_type, found.domain) == (TYPES[name], DOMAIN)
+    is_one = found is not None and (found.data_type, found.domain) == (TYPES[name], domain)
     return found if is_one else None

@@ -14,6 +14,8 @@ COLOR_STOPS = np.array([
     (253, 219, 199), (244, 165, 130), (214, 96, 77), (178, 24, 43),
 ]) / 255.0  # fmt: skip
 
+# Values are as good as 0 if no more than the share FEW of them are beyond this number of deviations.
+SIGNIFICANT, FEW = 1.645, 0.05
 UNKNOWN = (0.5, 0.5, 0.5, 1.0)  # The color of what has no value, in sRGB.
 
 
@@ -26,6 +28,15 @@ def symmetric_range(values: Array, floor: float) -> float:
     sizes.partition([before, min(before + 1, len(sizes) - 1)])
     one, other = sizes[before], sizes[min(before + 1, len(sizes) - 1)]
     return max(float(one + (at - before) * (other - one)), floor)
+
+
+def least_range(values: Array, stds: Array) -> float:
+    """The least range of a scale where values (n,) differ from 0 by less than their deviations (n,), or 0.
+
+    Then nearly all of them are as good as 0, and their range is that of the deviations: all colors are pale.
+    """
+    significant = np.abs(values) > SIGNIFICANT * stds
+    return 0.0 if significant.mean() > FEW else symmetric_range(stds, 0.0)
 
 
 def shades(values: ArrayLike, limit: float) -> Array:

@@ -36,14 +36,14 @@ def fill(
     mesh.update()
 
 
-def write(mesh: bpy.types.Mesh, name: str, values: Array) -> None:
+def write(mesh: bpy.types.Mesh, name: str, values: Array, domain: Any = DOMAIN) -> None:
     """Writes an attribute, and replaces one of this name and another type or domain."""
     # References to attributes must not outlive the next `new`, which moves all of them.
-    attribute = attribute_of(mesh, name)
+    attribute = attribute_of(mesh, name, domain)
     if attribute is None:
         if name in mesh.attributes:
             mesh.attributes.remove(mesh.attributes[name])
-        attribute = mesh.attributes.new(name, TYPES[name], DOMAIN)
+        attribute = mesh.attributes.new(name, TYPES[name], domain)
     attribute.data.foreach_set(KEYS[TYPES[name]], values.ravel())
 
 

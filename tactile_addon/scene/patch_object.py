@@ -12,7 +12,7 @@ from mathutils import Matrix
 from ... import core
 from ..touch.touch_object import Touched
 from ..touch.types import Array, Object
-from .attributes import COLOR, DEVIATION, HEIGHT_STD, NORMAL, PLACE, POSITION
+from .attributes import COLOR, DEVIATION, GAUSSIAN_STD, HEIGHT_STD, NORMAL, PLACE, POSITION
 from .contour_mesh import fill_contours
 from .family import add
 from .mesh_data import ABOVE, emission, fill, own_mesh, values, write
@@ -154,6 +154,7 @@ def _fill_patch(obj: Object, touched: Touched) -> None:
     places = np.column_stack([result.domain.places(points[:, :2]), np.zeros(len(points))])
     attributes = [
         *((name, _shown(name, result, points)) for name in QUANTITIES_OF_A_FIT),
+        (GAUSSIAN_STD, core.gaussian_curvature_stds(result, *points[:, :2].T)),
         (DEVIATION, deviation),
         (NORMAL, d.normal),
         (PLACE, places),
@@ -175,6 +176,8 @@ def _follow(obj: Object, touched: Touched) -> None:
     write(mesh, NORMAL, d.normal)
     if obj.tactile_colors in QUANTITIES_OF_A_FIT:
         write(mesh, obj.tactile_colors, _shown(obj.tactile_colors, result, points))
+    if obj.tactile_colors == "gaussian_curvature":
+        write(mesh, GAUSSIAN_STD, core.gaussian_curvature_stds(result, *plane.T))
 
 
 def _shown(name: str, result: core.Reconstruction, points: Array) -> Array:

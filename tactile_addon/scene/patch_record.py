@@ -7,14 +7,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import bpy
 import numpy as np
 from mathutils import Matrix
 
 from ... import core
 from ..touch.touch_report import TouchReport
 from ..touch.types import Array, Object
-from .attributes import COLOR, CURVATURES, DEVIATION, HEIGHT_STD, attribute_of
+from .attributes import COLOR, CORNERS, CURVATURES, DEVIATION, DOMAIN, HEIGHT_STD, attribute_of
 from .family import children_of
 
 # Custom properties of objects.
@@ -71,7 +70,7 @@ def extent_of(patch: Object) -> float:
 
 def require_whole(patch: Object) -> None:
     """Raises ValueError if the patch object was edited such that it is no patch any more."""
-    if report_of(patch) is None or not (patch.type == "MESH" and _is_whole(patch.data)):
+    if report_of(patch) is None or not (patch.type == "MESH" and _is_whole(patch)):
         raise edited(patch)
 
 
@@ -94,7 +93,7 @@ def reading(obj: Object) -> Iterator[None]:
 def is_colored(obj: Object) -> bool:
     """Whether an object is a patch or a whole object that nobody has edited, so that it can show colors."""
     is_one = ATLAS_RECORD in obj or (RECORD in obj and report_of(obj) is not None)
-    return is_one and obj.type == "MESH" and _is_whole(obj.data)
+    return is_one and obj.type == "MESH" and _is_whole(obj)
 
 
 def require_colored(obj: Object) -> None:
@@ -108,9 +107,10 @@ def touched_record(obj: Object | None) -> Any:
     return None if obj is None else obj.get(MAP_RECORD) or obj.get(ATLAS_RECORD)
 
 
-def _is_whole(mesh: bpy.types.Mesh) -> bool:
-    names = (*POWERS, COLOR)
-    return len(mesh.vertices) > 0 and all(attribute_of(mesh, name) is not None for name in names)
+def _is_whole(obj: Object) -> bool:
+    mesh, domain = obj.data, CORNERS if ATLAS_RECORD in obj else DOMAIN
+    found = [attribute_of(mesh, COLOR, domain), *(attribute_of(mesh, name) for name in POWERS)]
+    return len(mesh.vertices) > 0 and None not in found
 
 
 def mark_outdated(patch: Object, message: str) -> None:

@@ -8,10 +8,12 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ... import core
+from ..touch.arrays import read_array
 from ..touch.touch_report import TouchReport
 from ..touch.types import Array, Object
 from . import colors
-from .attributes import COLOR, CURVATURE_STD, CURVATURES
+from .attributes import COLOR, CURVATURE_STD, CURVATURES, GAUSSIAN_STD, POSITION
 from .mesh_data import ABOVE, own_mesh, values
 from .patch_record import (
     ATLAS_RECORD,
@@ -23,16 +25,9 @@ from .patch_record import (
     is_colored,
 )
 
-LEAST_RANGE = 1e-3  # The range of colors is no smaller, in unit radius, so that a plane is pale green.
-# That of a patch's curvatures is no smaller in units of the object's size, as all patches of a mesh have it.
-SIGNIFICANT = 2.0  # It is no smaller than this many deviations, because smaller values may be noise,
-PALE = 0.05  # unless all of these are below this share of it.
-# The deviations of curvatures by name.
-STDS = {
-    "gaussian_curvature": "gaussian_curvature_std",
-    "mean_curvature": "mean_curvature_std",
-    "curvedness": "mean_curvature_std",
-}
+# The range of colors is no smaller, so that a plane is pale green: in units of the radius, and for a patch's
+LEAST_RANGE = 1e-3  # curvatures in units of the size of its object, as all patches of a mesh have it.
+PALE = 0.05  # Values below this share of the range are pale.
 LEAST_SHARE = 0.5  # That of K is no smaller than this share of the median curvedness, squared.
 LAYER = "tactile_layer"  # A patch's number among those that overlap; 0 is the lowest.
 ABOVE_OTHERS = "Above Other Patches"  # The modifier that draws it above those with lower numbers,
@@ -44,39 +39,53 @@ ALIKE = 0.5  # Patches overlap only if the cosine between their normals is more.
 def recolor(obj: Object) -> None:
     """Colors a patch or whole object by the quantity it is set to show, and keeps the range in its record.
 
-    What is unknown of a whole object is gray, and does not count in the range.
+    What is unknown of a whole object does not count in the range. Beside creases it is as on the same wall,
+    or gray if the wall is narrow.
     """
     own_mesh(obj)
     shown, mesh = obj.tactile_colors, obj.data
     shades, record = values(mesh, shown), obj[RECORD if RECORD in obj else ATLAS_RECORD]
     unknown = _unknown(mesh) if shown in CURVATURES else []
-    floor = _least_range(record, shown, np.delete(shades, unknown))
+    length = record.get("object_size", record["radius"]) if shown in CURVATURES else record["radius"]
+    floor = LEAST_RANGE * length ** POWERS[shown]
     curvedness = np.delete(values(mesh, "curvedness"), unknown)
     if shown == "gaussian_curvature" and len(curvedness):
         # |K| is at most the square of the curvedness. Far below that, as on a cylinder, it is as good as 0.
         floor = max(floor, LEAST_SHARE * float(np.median(curvedness)) ** 2)
     record["own_limit"] = colors.symmetric_range(np.delete(shades, unknown), floor)
-    limit = obj.get(RANGE) or max(record["own_limit"], obj.get(COMMON_RANGE, 0.0))
-    rgba = colors.diverging(shades, limit, unknown)
-    mesh.attributes[COLOR].data.foreach_set("color", rgba.ravel())
+    common = max(obj.get(COMMON_RANGE, 0.0), _error_range(mesh, shown, unknown, floor))
+    limit = obj.get(RANGE) or max(record["own_limit"], common)
+    rgba = colors.diverging(np.append(shades, 0.0), limit, [len(shades)])
+    is_whole = ATLAS_RECORD in obj
+    at = _corners_shown(mesh, unknown, record["edge"]) if is_whole else np.arange(len(shades))
+    mesh.attributes[COLOR].data.foreach_set("color", rgba[at].ravel())
+    record["is_gray"] = bool((at < 0).any())
     if mesh.color_attributes.active_color_name != COLOR or mesh.color_attributes.default_color_name != COLOR:
         mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
     mesh.update()
     record["color_limit"] = limit
 
 
-def _least_range(record: Mapping[str, Any], shown: str, shades: Array) -> float:
-    """The smallest range of colors for values (n,): with it, those that may be noise are pale."""
-    length = record.get("object_size", record["radius"]) if shown in STDS else record["radius"]
-    least = float(LEAST_RANGE * length ** POWERS[shown])
-    if colors.symmetric_range(shades, 0.0) <= PALE * least:
-        return least
-    return max(least, SIGNIFICANT * record.get(STDS.get(shown, ""), 0.0))
+def _error_range(mesh: bpy.types.Mesh, shown: str, unknown: Any, floor: float) -> float:
+    """The range below which colors would show the errors of K, which is no range of other patches, or 0."""
+    if shown != "gaussian_curvature" or GAUSSIAN_STD not in mesh.attributes:
+        return 0.0
+    k, std = (np.delete(values(mesh, name), unknown) for name in (shown, GAUSSIAN_STD))
+    return 0.0 if colors.symmetric_range(k, 0.0) <= PALE * floor else colors.least_range(k, std)
 
 
 def _unknown(mesh: bpy.types.Mesh) -> Any:
     """The indices of the vertices whose curvatures are unknown; a patch has none."""
     return np.flatnonzero(np.isinf(values(mesh, CURVATURE_STD))) if CURVATURE_STD in mesh.attributes else []
+
+
+def _corners_shown(mesh: bpy.types.Mesh, unknown: Any, edge: float) -> Array:
+    """The vertex whose color each corner of the faces has, (k,), and -1 where it is gray."""
+    known = np.ones(len(mesh.vertices), dtype=bool)
+    known[unknown] = False
+    normals, facing = read_array(mesh.vertices, "normal", 3), read_array(mesh.corner_normals, "vector", 3)
+    corners = read_array(mesh.loops, "vertex_index", dtype=np.int32)
+    return core.vertices_shown(values(mesh, POSITION), normals, known, corners, facing, edge)
 
 
 def settle(patch: Object) -> None:

@@ -55,7 +55,7 @@ TIPS = {
     "Patches": "Number of touches that gave a patch",
     "No Patch": "Number of touches that gave no patch, by reason",
     "… in Doubt": "Number of these patches that are in doubt",
-    "… without K": "Number of these vertices whose curvatures are unknown, beside edges and rims; gray",
+    "… without K": "Number of these vertices whose curvatures are unknown, beside edges and rims",
 }
 
 

@@ -14,7 +14,7 @@ from gpu_extras.batch import batch_for_shader
 
 from ..probes import probe
 from ..scene import colors, patch_record
-from ..scene.attributes import CURVATURES, REASON
+from ..scene.attributes import REASON
 from ..scene.contour_mesh import RIM_CORNERS
 from ..scene.viewports import shows_colors
 from ..stability_map import map_object
@@ -150,7 +150,7 @@ def draw_legend() -> None:
         title = patch.bl_rna.properties["tactile_colors"].enum_items[shown].name
         unit = units.unit_of_report(context.scene, record)
         bar = _scale(title, record, unit, patch_record.POWERS[shown], low)
-        unknown = record.get("unknown_curvatures") if shown in CURVATURES else None
+        unknown = record.get("is_gray")
         _draw_box(context, *bar, [("Unknown", colors.UNKNOWN)] if unknown else ())
     elif obj is not None and patch_record.MAP_RECORD in obj and obj.visible_get():
         record, shown = obj[patch_record.MAP_RECORD], obj.tactile_map_colors

@@ -13,8 +13,8 @@ from mathutils import Matrix
 
 from ... import core
 from ..scene import colors, patch_object, patch_record, undo
-from ..scene.attributes import COLOR, DEVIATION, HEIGHT_STD, NODE
-from ..scene.mesh_data import ABOVE, emission, fill, own_mesh
+from ..scene.attributes import COLOR, CORNERS, DEVIATION, HEIGHT_STD, NODE
+from ..scene.mesh_data import ABOVE, emission, fill, own_mesh, write
 from ..scene.shown import ALIKE, recolor, settle_on
 from ..scene.viewports import show_colors, show_size
 from ..touch.detached_mesh import DetachedMesh
@@ -130,9 +130,9 @@ def rewrite(obj: Object, whole: WholeSurface, report: dict[str, Any]) -> None:
         (HEIGHT_STD, found.std),
         (DEVIATION, whole.deviation),
         (NODE, found.patch.astype(np.int32)),
-        (COLOR, np.ones((len(found.vertices), 4))),
     ]
     fill(mesh, found.vertices, found.triangles, attributes)
+    write(mesh, COLOR, np.ones((found.triangles.size, 4)), CORNERS)
     mesh.shade_smooth()
     mesh.set_sharp_from_angle(angle=SHARP)
     obj[patch_record.ATLAS_RECORD] = report | {"object": obj.name}

@@ -168,3 +168,26 @@ def test_a_map_is_above_its_mesh_and_below_patches(empty, ball):
     shown = np.linalg.norm(positions(painted.evaluated_get(depsgraph).data), axis=1)
     assert 1.01 < shown.min() <= shown.max() < 1.02
     assert np.allclose(np.linalg.norm(positions(painted.data), axis=1), 1.0)
+
+
+def test_a_patch_on_a_cylinder_is_pale_up_to_its_rim(empty):
+    """At the rim K of a patch on facets is some half of that of a ball, and its deviation larger."""
+    empty.ops.mesh.primitive_cylinder_add()
+    empty.context.object.name = "Sphere"
+    for place in ((0.64, -0.77, 0.3), (0.1, -0.99, -0.08), (0.83, 0.56, -0.66)):
+        patch = touch(empty, place, extent=0.0)
+        found, stds = values(patch.data, "gaussian_curvature"), values(patch.data, "gaussian_curvature_std")
+        assert np.abs(found).max() > 0.3
+        assert np.mean(np.abs(found) > 1.645 * stds) < 0.05
+        assert np.abs(found).max() < 0.3 * patch["tactile"]["color_limit"]
+        assert patch["tactile"]["own_limit"] < 1.0  # Others that it overlaps do not become pale.
+
+
+def test_a_patch_that_is_curved_in_part_has_the_range_of_its_curvature(empty):
+    empty.ops.mesh.primitive_torus_add(major_segments=96, minor_segments=48)
+    empty.context.object.name = "Sphere"
+    for place in ((1.0, 0.0, 0.25), (0.9, -0.9, 0.0), (0.55, -0.55, 0.0)):  # K changes its sign at the first
+        patch = touch(empty, place, extent=0.0)
+        wild = np.percentile(np.abs(values(patch.data, "gaussian_curvature")), 98.0)
+        assert patch["tactile"]["own_limit"] == pytest.approx(wild, rel=0.3)
+        assert patch["tactile"]["color_limit"] < 7.0

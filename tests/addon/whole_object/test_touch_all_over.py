@@ -61,7 +61,7 @@ def test_colors_show_what_is_chosen(empty, ball):
 
 
 @pytest.mark.long
-def test_near_the_edges_of_a_cube_curvatures_are_unknown_and_gray(empty, extension):
+def test_near_the_edges_of_a_cube_curvatures_are_unknown_and_colors_those_of_the_wall(empty, extension):
     empty.ops.mesh.primitive_cube_add(size=2.0)
     surface, record = touched(empty)
     mesh, gray = surface.data, extension.tactile_addon.scene.colors.linear([(0.5, 0.5, 0.5, 1.0)])[0]
@@ -77,10 +77,17 @@ def test_near_the_edges_of_a_cube_curvatures_are_unknown_and_gray(empty, extensi
     )
     for shown in ("mean_curvature", "curvedness", "height_std"):
         surface.tactile_colors = shown
-        shades = np.empty((len(mesh.vertices), 4))
-        mesh.attributes["curvature_color"].data.foreach_get("color", shades.ravel())
-        is_gray = np.isclose(shades, gray, atol=1e-6).all(axis=1)
-        assert (is_gray == (unknown if shown != "height_std" else False)).all()
+        colors = mesh.attributes["curvature_color"]
+        assert colors.domain == "CORNER"
+        shades = np.empty((len(mesh.loops), 4))
+        colors.data.foreach_get("color", shades.ravel())
+        assert not np.isclose(shades, gray, atol=1e-6).all(axis=1).any()
+        assert not record["is_gray"]
+    surface.tactile_colors = "curvedness"
+    values_at = np.where(unknown, 1e3, values(mesh, "curvedness"))
+    mesh.attributes["curvedness"].data.foreach_set("value", values_at)
+    extension.tactile_addon.scene.shown.recolor(surface)
+    assert surface["tactile_object"]["color_limit"] < 1.0  # What is unknown does not count.
 
 
 @pytest.mark.parametrize(

@@ -201,3 +201,25 @@ def test_a_folded_triangle_is_no_crease():
     inner = (np.abs(mesh.vertices[:, :2]) < 0.7).all(axis=1)
     assert np.isfinite(found.mean_std[inner]).all()
     assert np.abs(found.mean[inner] + 0.2).mean() < 0.01
+
+
+@pytest.mark.parametrize(("wide", "has_values"), [(10, True), (2, False)])
+def test_beside_a_crease_a_wall_is_shown_as_where_its_curvatures_are_known(wide, has_values):
+    """Two walls meet along the line x = z = 0; on one of them, all is unknown if it is narrow."""
+    along = np.arange(10.0)
+    floor = np.array([(x, y, 0.0) for x in range(11) for y in along])
+    wall = np.array([(0.0, y, z) for z in range(1, wide + 1) for y in along])
+    points = np.vstack([floor, wall])
+    up, out = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+    normals = np.where(points[:, :1] > 0.0, up, out)
+    known = np.maximum(points[:, 0], points[:, 2]) > 2.0
+    crease = np.flatnonzero(points[:, 0] + points[:, 2] == 0.0)
+    corners, facing = np.tile(crease, 2), np.repeat([up, out], len(crease), axis=0)
+    found = core.vertices_shown(points, normals, known, corners, facing, 1.0)
+    assert np.allclose(points[found[:10]], points[crease] + (3.0, 0.0, 0.0))
+    if has_values:
+        assert np.allclose(points[found[10:]], points[crease] + (0.0, 0.0, 3.0))
+    else:
+        assert (found[10:] == -1).all()
+    assert (core.vertices_shown(points, normals, ~known, crease, facing[:10], 1.0) == crease).all()
+    assert (core.vertices_shown(points, normals, known & False, crease, facing[:10], 1.0) == -1).all()
