@@ -26,13 +26,13 @@ from .sampling_density import stride_of
 # benchmarks.extents judges how far curves grow.
 MOST_STEPS = 96  # A half curve as long as it may be has this number of steps.
 SEEDS = (24, 12, 6, 3)  # A half curve begins with one of these numbers of steps.
-MAX_STD = 0.55 * DOUBTFUL_STD  # Growth ends here: the longest patches underestimate their deviation.
+MAX_STD = 0.6 * DOUBTFUL_STD  # Growth ends here: the longest patches underestimate their deviation.
 # A misfit ratio is measured such that growth ends where it exceeds 1.
 STRETCH = 1.5  # A half curve grows by this factor at once, and by its square up to the ratio EASY.
 EASY = 0.1
+MAX_SPREAD_SHORT_SEED = 0.75  # Where curves twice as long exceed 1, only those of at most this spread grow.
 SKIP_RATIO = 3.0  # Beyond this ratio curves half as long are not tried: they are too long as well.
-CLOSE = 0.85  # Where curves that are longer exceed 1, those of a larger spread do not grow (benchmarks.real).
-SEARCH_FACTOR = 1.15  # Lengths that differ by a smaller factor are not told apart (benchmarks.real).
+SEARCH_FACTOR = 1.15  # A sure touch may be shorter than one that is not by this factor (benchmarks.real).
 ROUGHNESS_LIMIT = 0.0085  # Contacts of this roughness have a fit that ends growth, in 99 of 100 cases.
 MAX_RESIDUAL_RATIO = 3.0  # The root mean square residual of a half curve may be this many times its noise.
 
@@ -156,55 +156,52 @@ def grown(track: Track, farthest: float, step: float) -> Fits:
     found = yield from _seed(track, step, trials)
     # A shorter one was tried after it and has more misfit. Noise causes that: longer curves bear it better.
     if found.result.noise > MISFIT and found is not trials[-1]:
-        return (yield from _longer(track, farthest, found, np.inf))
+        return (yield from _longer(track, farthest, found, np.inf, np.inf))
     if found.misfit_ratio > 1.0:
         return found
+    longest = (found.counts == np.minimum(SEEDS[0], found.tracked.whole)).all()
     too_long = min((trial.length for trial in trials if trial.spread > 1.0), default=np.inf)
-    return (yield from _longer(track, farthest, found, too_long))
+    return (yield from _longer(track, farthest, found, 1.0 if longest else MAX_SPREAD_SHORT_SEED, too_long))
 
 
-def _longer(track: Track, farthest: float, found: GrowthTrial, too_long: float) -> Fits:
+def _longer(track: Track, farthest: float, found: GrowthTrial, most: float, too_long: float) -> Fits:
     """Half curves lengthened by STRETCH, or by its square while misfits are below EASY, and fitted again.
 
-    The half curve with the largest misfit above 1 stops. If the spread exceeds 1, the square root of the
-    factor is tried, as long as that is no less than SEARCH_FACTOR and the last spread at most CLOSE.
+    The half curve with the largest misfit above 1 stops; all stop if the spread exceeds 1, and its last
+    length counts.
 
+    most : the spread above which nothing grows
     too_long : a length that the longest half curve does not reach
     """
-    accepted, tracked, growing = [found], found.tracked, np.full(found.counts.shape, True)
-    factor = STRETCH**2
-    while (growing := growing & tracked.goes_on(found.counts)).any():
-        factor = min(factor, STRETCH) if found.misfit_ratio > EASY else factor
-        if factor < SEARCH_FACTOR or (np.isfinite(too_long) and found.spread > CLOSE):
-            break
-        longer = np.ceil(np.where(growing, factor, 1.0) * found.counts).astype(np.intp)
-        if float(longer.max()) * tracked.step >= too_long:
-            factor = np.sqrt(factor)
+    accepted, tracked, growing, quick = [found], found.tracked, np.full(found.counts.shape, True), True
+    while found.spread <= most and (growing := growing & tracked.goes_on(found.counts)).any():
+        quick = quick and found.misfit_ratio <= EASY
+        stretched = np.ceil((STRETCH**2 if quick else STRETCH) * found.counts)
+        longer = np.where(growing, stretched, found.counts).astype(np.intp)
+        length = float(longer.max()) * tracked.step
+        if length >= too_long:
+            if not quick:
+                break
+            quick = False
             continue
+        if (tracked.open & (longer > tracked.whole)).any():
+            further = min(length + tracked.step, farthest)  # One step more shows whether they end there.
+            tracked = track(further)
         try:
-            trial = yield from _lengthened(track, farthest, tracked, longer)
+            trial = yield from fit_trial(tracked, np.minimum(longer, tracked.whole))
         except DegenerateCurvesError:
             break
-        tracked = trial.tracked
-        if trial.misfits.max() <= 1.0 and trial.spread <= max(1.0, found.spread):
-            accepted.append(found := trial)
-            continue
-        if trial.misfits.max() > 1.0 and factor <= STRETCH:
+        if quick and trial.misfit_ratio > 1.0:
+            quick = False
+        elif trial.misfits.max() > 1.0:  # The half curve that is explained worst ends here.
             growing.flat[np.argmax(np.where(growing, trial.misfits, -1.0))] = False
-            continue
-        too_long = trial.length if trial.spread > 1.0 else too_long
-        factor = np.sqrt(factor)
+        elif trial.spread > max(1.0, found.spread):
+            break
+        else:
+            accepted.append(found := trial)
     # A sure touch is better than a larger one that is not.
     sure = next((trial for trial in reversed(accepted) if trial.is_sure), found)
     return sure if tracked.largest_std else (yield from _longest_sure(sure, found))
-
-
-def _lengthened(track: Track, farthest: float, tracked: TrackedContours, counts: Counts) -> Fits:
-    """The fit of these numbers of contacts, or as many as there are, tracked farther if necessary."""
-    if (tracked.open & (counts > tracked.whole)).any():
-        # One step more shows whether they end there.
-        tracked = track(min(float(counts.max() + 1) * tracked.step, farthest))
-    return (yield from fit_trial(tracked, np.minimum(counts, tracked.whole)))
 
 
 def _longest_sure(sure: GrowthTrial, longer: GrowthTrial) -> Fits:

@@ -84,21 +84,6 @@ def test_among_waves_curves_that_are_short_for_their_noise_grow_between_the_leng
     assert true_error(surface, found) < 1.5 * found.result.mean_height_std
 
 
-def test_on_similar_surfaces_extents_are_similar():
-    def waves(wide):
-        return bowl_with(
-            lambda x, y: 0.8 * np.sin(x / wide) * np.sin(y / wide),
-            lambda x, y: (
-                0.8 / wide * np.cos(x / wide) * np.sin(y / wide),
-                0.8 / wide * np.sin(x / wide) * np.cos(y / wide),
-            ),
-        )
-
-    extents = [explore(waves(wide)).extent for wide in 1.6 * 1.05 ** np.arange(20)]
-    assert max(np.exp(np.abs(np.diff(np.log(extents))))) < 1.4  # half curves grow by a factor of 1.5 at once
-    assert extents[-1] > 3.0 * extents[0]
-
-
 def short_waves():
     return bowl_with(
         lambda x, y: 0.4 * np.sin(2.0 * x) * np.sin(2.0 * y),
