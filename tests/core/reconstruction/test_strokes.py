@@ -369,7 +369,7 @@ def test_from_inside_strokes_show_the_mirror_image(name):
 ACROSS = np.array([0.0, 1.0, 0.0])
 LINE = np.column_stack([np.linspace(-9, 9, 200), np.zeros(200), np.zeros(200)])
 TURNS = np.linspace(0.0, 6.0, 200)
-NEEDED = "contacts? around the point, and 6 are needed: measure more, or use a larger"
+NEEDED = " around the point, and 6 are needed: measure more, or use a larger"
 OPEN = "the strokes run along a line, two lines or a ring, which leaves the surface beside them open"
 
 
