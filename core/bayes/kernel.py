@@ -18,7 +18,6 @@ from ..lapack import cholesky
 LENGTHS = np.array([0.4, 1.6])  # The lengths l_i, as shares of the radius (benchmarks.real).
 DISTANCES_AT_ONCE = 6000  # The number of distances that fit into a processor's cache.
 KERNEL_ROUNDING = 1e-9  # This share of its mean is added to the diagonal of k(u, u), so that it has a factor.
-PARTIALS = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
 
 
 def places_factor(within: Array) -> Array:
@@ -31,8 +30,7 @@ def kernel(p: Array, q: Array, variances: Array) -> Array:
     """Covariances of g at points (..., n, 2) and (..., m, 2), (..., n, m), for variances (2,)."""
     one, other = kernels(p, q)
     one *= variances[0]
-    other *= variances[1]
-    one += other
+    one += variances[1] * other
     return one
 
 
@@ -74,18 +72,10 @@ def _maternes(distance: Array) -> list[Array]:
     return [other, a]
 
 
-def derived_kernel(p: Array, places: Array, variances: Array, weights: Array) -> Array:
-    """k(p, places) @ weights at points (n, 2) and its derivatives by p, (6, n), in the order of PARTIALS."""
-    total = np.zeros((len(PARTIALS), len(p)))
-    for variance, length in zip(variances, LENGTHS, strict=True):
-        total += variance * (_derived_matern(p[:, None] - places, length) @ weights)
-    return total
-
-
-def kernel_slopes(p: Array, places: Array, variances: Array) -> Array:
-    """Derivatives of k(p, places) by p at points (n, 2), (2, n, m)."""
+def derived_kernel(p: Array, places: Array, variances: Array) -> Array:
+    """k(p, places) of points (n, 2) and (m, 2), and its derivatives by p: (6, n, m), ordered as PARTIALS."""
     each = zip(variances, LENGTHS, strict=True)
-    return sum(v * _derived_matern(p[:, None] - places, length)[1:3] for v, length in each)
+    return sum(v * _derived_matern(p[:, None] - places, length) for v, length in each)
 
 
 def _derived_matern(apart: Array, length: float) -> Array:

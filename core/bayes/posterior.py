@@ -21,9 +21,18 @@ from numpy.typing import ArrayLike, NDArray
 from ..arguments import Array
 from ..lapack import solved
 from ..patch.differential_geometry import Derivatives
-from ..patch.monge import DEGREE, TERMS, HeightField, MongePatch, exponents, monomials, polynomial_derivatives
+from ..patch.monge import (
+    DEGREE,
+    PARTIALS,
+    QUARTIC,
+    TERMS,
+    HeightField,
+    MongePatch,
+    monomials,
+    polynomial_derivatives,
+)
 from . import kernel as process
-from .kernel import PARTIALS, derived_kernel, kernel, kernels, places_factor, weighted_kernel
+from .kernel import derived_kernel, kernel, kernels, places_factor, weighted_kernel
 from .prior import FREE, ORDERS
 
 WINDING = 1j * (TERMS[:, 0] - TERMS[:, 1])  # A turn by t adds (i - j) t to the phase of z^i z'^j, z = x + iy.
@@ -97,8 +106,7 @@ class SurfacePosterior(HeightField):
     def residuals(self, contacts: Array) -> Array:
         """The heights (b, n) of contacts (b, n, 3) above b polynomials."""
         basis = monomials(contacts[..., 0].ravel(), contacts[..., 1].ravel(), TERMS)
-        basis = basis.reshape(*contacts.shape[:2], -1)
-        return contacts[..., 2] - (basis @ self.mean[..., None])[..., 0]
+        return contacts[..., 2] - (basis.reshape(*contacts.shape[:2], -1) @ self.mean[..., None])[..., 0]
 
     # What follows is for a single posterior, not for a stack.
 
@@ -111,15 +119,14 @@ class SurfacePosterior(HeightField):
         """The mean height at (x, y)."""
         z: Array = polynomial_derivatives(self.mean, TERMS, x, y, PARTIALS[:1])[0]
         if len(self.places):
-            p = _rows(x, y)
-            z += weighted_kernel(p, self.places, self.variances, self.alpha).reshape(z.shape)
+            z += weighted_kernel(_rows(x, y), self.places, self.variances, self.alpha).reshape(z.shape)
         return z
 
     def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
         """Height, slopes and second derivatives of the mean at (x, y)."""
         d = polynomial_derivatives(self.mean, TERMS, x, y, PARTIALS)
         if len(self.places):
-            d += derived_kernel(_rows(x, y), self.places, self.variances, self.alpha).reshape(d.shape)
+            d += (derived_kernel(_rows(x, y), self.places, self.variances) @ self.alpha).reshape(d.shape)
         return Derivatives(*d)
 
     def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
@@ -127,10 +134,6 @@ class SurfacePosterior(HeightField):
         known, left = self._whitened(_rows(x, y))
         variance = np.einsum("in,in->n", left, left) - np.einsum("in,in->n", known, known)
         return np.sqrt(np.maximum(self.variances.sum() + variance, 0.0))
-
-    def height_covariance(self, p: Array, q: Array) -> Array:
-        """Covariances of the heights at points (..., n, 2) and (..., m, 2), (..., n, m)."""
-        return self._covariance(p, self._signed(p), q, self._signed(q))
 
     def covariances_with(self, q: Array) -> Callable[[Array], tuple[Array, Array]]:
         """A function: covariances of heights at points (..., n, 2) with those at q (m, 2), and each other."""
@@ -155,9 +158,8 @@ class SurfacePosterior(HeightField):
 
     def _whitened(self, p: Array) -> tuple[Array, Array]:
         """L^-1 k(u, p), (m, n), and root @ f(p), (r, n), at points (n, 2)."""
-        terms = monomials(p[:, 0], p[:, 1], TERMS).T
         within = kernel(self.places, p, self.variances) if len(self.places) else np.empty((0, len(p)))
-        return self._whitened_sums(terms, np.ones(len(p)), within)
+        return self._whitened_sums(monomials(p[:, 0], p[:, 1], TERMS).T, np.ones(len(p)), within)
 
     def _whitened_sums(self, terms: Array, ones: Array, within: Array) -> tuple[Array, Array]:
         """What `_whitened` gives for terms (27, n), ones (n,) and k(u, p) (m, n), or for sums of such."""
@@ -214,8 +216,7 @@ class SurfacePosterior(HeightField):
 
     def degree_shown(self, contacts: Array) -> int:
         """The least degree whose patch is off the mean by at most half its deviation at contacts (n, 3)."""
-        x, y, _ = contacts.T
-        basis = monomials(x, y, TERMS)
+        basis = monomials(contacts[:, 0], contacts[:, 1], TERMS)
         left = basis @ self.root[:, :-1].T
         variance = np.einsum("ni,ni->", left, left)
         off = basis[:, FREE:] @ (_departures() @ self.polynomial[FREE:]).T
@@ -313,8 +314,7 @@ def _truncation(degree: int) -> Array:
 @cache
 def _departures() -> Array:
     """What truncations of degree 2 to 5 leave of the terms of degree 3 to 6, (4, 22, 22)."""
-    size = terms_to(DEGREE) - FREE
-    departures = np.tile(np.eye(size), (DEGREE - LEAST_DEGREE, 1, 1))
+    departures = np.tile(np.eye(len(TERMS) - FREE), (DEGREE - LEAST_DEGREE, 1, 1))
     for k, departure in enumerate(departures):
         truncation = _truncation(LEAST_DEGREE + k)
         departure[: len(truncation)] -= truncation
@@ -371,7 +371,7 @@ def _projection() -> tuple[Array, Array]:
     x, y, shares = nodes()
     whole, root = np.column_stack([x, y]), np.sqrt(shares)
     near = QUARTIC_SHARE / DISK * whole
-    quartic = np.linalg.pinv(root[:, None] * monomials(near[:, 0], near[:, 1], exponents(0, 4)))[1:] * root
+    quartic = np.linalg.pinv(root[:, None] * monomials(near[:, 0], near[:, 1], QUARTIC))[1:] * root
     basis = monomials(x, y, TERMS)
     rest = np.linalg.pinv(root[:, None] * basis[:, FREE:]) * root
     first = np.hstack([quartic[:FREE], np.zeros((FREE, len(x)))])
@@ -382,8 +382,8 @@ def _projection() -> tuple[Array, Array]:
 @cache
 def _projected_terms() -> Array:
     """What the projection makes of each term, (27, 27)."""
-    (x, y), weights = _projection()[0].T, _projection()[1]
-    return weights @ monomials(x, y, TERMS)
+    at, weights = _projection()
+    return weights @ monomials(at[:, 0], at[:, 1], TERMS)
 
 
 @cache

@@ -26,6 +26,7 @@ def exponents(lowest: int, highest: int) -> NDArray[np.intp]:
 DEGREE = 6  # The default fit sees all terms up to this degree at once.
 TERMS = exponents(1, DEGREE)
 QUADRIC, QUARTIC = exponents(0, 2), exponents(0, 4)
+PARTIALS = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]  # The orders (dx, dy) of Derivatives.
 
 
 def monomials(x: Array, y: Array, terms: NDArray[np.intp]) -> Array:
@@ -153,11 +154,11 @@ class MongePatch(HeightField):
 
     def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
         """Height, slopes and second derivatives at (x, y)."""
-        return Derivatives(*self._evaluate(x, y, [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]))
+        return Derivatives(*self._evaluate(x, y, PARTIALS))
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """z(x, y)."""
-        return self._evaluate(x, y, [(0, 0)])[0]
+        return self._evaluate(x, y, PARTIALS[:1])[0]
 
     def _evaluate(self, x: ArrayLike, y: ArrayLike, orders: list[tuple[int, int]]) -> Array:
         """The derivatives (m, ...) of m orders (dx, dy)."""

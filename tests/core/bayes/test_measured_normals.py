@@ -192,7 +192,7 @@ def test_the_evidence_is_that_of_heights_and_slopes_under_a_normal_distribution(
     basis = np.vstack([monomials(x, y, TERMS), slopes])
     for both in (True, False):
         count = 180 if both else 60
-        some = data.heights, data.counts, data.slopes if both else None
+        some = data.heights, data.counts, both * data.slopes
         found = evidence.neg2_log_evidence(*some, variances, noises)[0]
         wanted = np.empty((2, 2))
         for (w, i), _ in np.ndenumerate(wanted):
@@ -457,4 +457,4 @@ def test_normals_show_the_slopes_of_the_process_too():
     over = rng.uniform(-0.7, 0.7, (30, 2))
     assert found.height(*over.T) == pytest.approx(features(over) @ covariance @ basis.T @ felt, abs=1e-6)
     left = kernel(over, over, variances) - (f := features(over))[:, 27:] @ f[:, 27:].T + f @ covariance @ f.T
-    assert found.height_covariance(over, over) == pytest.approx(left, abs=1e-7)
+    assert found.covariances_with(over)(over)[0] == pytest.approx(left, abs=1e-7)

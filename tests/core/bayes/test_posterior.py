@@ -316,7 +316,8 @@ def test_few_contacts_are_enough_for_a_finite_answer():
 def test_without_evidence_the_waviness_is_the_priors(monkeypatch):
     """The prior is log-normal about 0.6."""
     monkeypatch.setattr(evidence, "neg2_log_evidence", lambda *_: np.zeros((1, 6, 5)))
-    found = evidence.hyperparameters(1e-12 * np.eye(28)[None], np.array([9.0]), None, np.array([0.01]))
+    heights = 1e-12 * np.eye(28)[None]
+    found = evidence.hyperparameters(heights, np.array([9.0]), np.zeros_like(heights), np.array([0.01]))
     w = evidence.WAVINESS
     density = np.exp(-0.5 * (np.log(w / 0.6) / 0.5) ** 2)
     density /= density.sum()
@@ -469,7 +470,7 @@ def test_a_height_at_the_origin_that_is_open_varies_with_the_terms():
     basis = np.column_stack([monomials(x, y, TERMS), np.ones(9)])
     wanted, points = basis @ root.T @ root @ basis.T, np.column_stack([x, y])
     assert some.height_std(x, y) ** 2 == pytest.approx(wanted.diagonal())
-    assert some.height_covariance(points, points) == pytest.approx(wanted)
+    assert some.covariances_with(points)(points)[0] == pytest.approx(wanted)
 
 
 def test_a_stack_whose_touches_settle_one_after_the_other_gives_what_single_fits_give():

@@ -131,7 +131,7 @@ def test_mean_and_deviation_are_those_of_a_dense_gaussian_process(noise):
     left = covariance(points, points, wanted, wanted) - shared @ np.linalg.solve(seen, shared.T)
     assert surface.height(*points.T) == pytest.approx(mean, abs=1e-5)
     assert surface.height_std(*points.T) ** 2 == pytest.approx(np.diag(left), rel=1e-2, abs=1e-8)
-    assert surface.height_covariance(points, points) == pytest.approx(left, abs=1e-7)
+    assert surface.covariances_with(points)(points)[0] == pytest.approx(left, abs=1e-7)
 
 
 def test_the_patch_is_that_of_the_surface_over_a_disk():
@@ -359,7 +359,7 @@ def test_the_likelihoods_are_those_of_the_heights_under_a_normal_distribution():
         within = amplitude**2 * kernel.kernels(flat, flat)[length]
         white = noise**2 * np.eye(len(flat))
         assert found == pytest.approx(neg2_log(of_terms[1] + within + white), rel=1e-6)
-    normal_equations = (rows @ rows.T)[None], np.array([len(flat)]), None
+    normal_equations = (rows @ rows.T)[None], np.array([len(flat)]), np.zeros((1, 28, 28))
     sextics = evidence.neg2_log_evidence(*normal_equations, variances, noises[None])[0]
     for (w, i), value in np.ndenumerate(sextics):
         wanted = neg2_log(of_terms[w] + noises[i] ** 2 * np.eye(len(flat)))
