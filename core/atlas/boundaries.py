@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..patch.monge import TERMS, derived_monomials
+from ..patch.monge import PARTIALS, TERMS, derived_monomials
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import polynomial_dict
 from .charts import MARGIN, Charts
@@ -24,7 +24,6 @@ RAYS, RAY_PLACES = 32, 16
 # Surfaces have terms beyond a sextic's, which count more and more outward: at a radius from the middle the
 # deviation of K is larger by the exponential of this (python -m benchmarks.atlas).
 OUTWARD_STD = 1.3
-SLOPES_AND_BENDS = (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)  # Curvatures follow from these derivatives.
 
 
 class Edge(NamedTuple):
@@ -86,8 +85,8 @@ def gaussian_curvature_of(r: Reconstruction, points: Array) -> tuple[Array, Arra
     The deviation follows from the gradient of K in the coefficients and, since that does not suffice at a
     rim, from the second-order variance of z_xx z_yy - z_xy^2 for normally distributed second derivatives.
     """
-    x, y, _ = ((points - r.frame.origin) @ r.frame.axes).T
-    by = np.swapaxes(derived_monomials(x / r.radius, y / r.radius, TERMS, SLOPES_AND_BENDS), 1, 2)
+    local = r.frame.to_local(points)
+    by, (x, y, _) = derived_monomials(local / r.radius, TERMS, PARTIALS[1:]), local.T
     derivatives, covariance = by @ r.posterior.polynomial, r.posterior.covariance
     zx, zy, zxx, zxy, zyy = derivatives[:, :, None]
     steep = 1.0 + zx**2 + zy**2

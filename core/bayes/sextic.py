@@ -66,8 +66,7 @@ def sextics(local: Array, weights: Array, expected: Array, normals: Array, throu
     """
     b, n = weights.shape
     rows, pivot = np.empty((b, len(TERMS) + 1, n)), np.zeros((b, len(TERMS)))
-    terms = monomials(local[..., 0].ravel(), local[..., 1].ravel(), TERMS)
-    rows[:, :-1] = terms.T.reshape(-1, b, n).transpose(1, 0, 2)
+    rows[:, :-1] = monomials(local, TERMS).swapaxes(1, 2)
     np.subtract(local[..., 2], (expected[:, None] @ rows[:, :-1])[:, 0], out=rows[:, -1])
     if not through:
         means = np.einsum("bin,bn->bi", rows, weights / weights.sum(axis=1)[:, None])

@@ -30,7 +30,7 @@ def problem(k1: float, k2: float, degree: int, points: Array) -> Problem:
     """The problem (5) for the terms of degree 3 to `degree` at local contacts (n, 3)."""
     quadric = MongePatch(k1, k2, np.empty(0))
     x, y, z = points.T
-    return Problem(quadric, degree, monomials(x, y, exponents(3, degree)), z - quadric.height(x, y))
+    return Problem(quadric, degree, monomials(points, exponents(3, degree)), z - quadric.height(x, y))
 
 
 def condition_number(basis: Array) -> float:
@@ -57,7 +57,7 @@ def quadratic_variation(data: Problem, domain: Domain, weight: float) -> Array:
 def on_grid(data: Problem, domain: Domain, orders: list[tuple[int, int]]) -> tuple[Array, Array, float]:
     """k derivatives of the terms, (k, terms, m), and the quadric, (k, m), on the m points of (8); and h."""
     points, h = domain.grid(GRID)
-    terms = derived_monomials(points[:, 0], points[:, 1], exponents(2, data.degree), orders)
+    terms = derived_monomials(points, exponents(2, data.degree), orders).swapaxes(1, 2)
     quadric_bends = 0.5 * (data.quadric.k1 * terms[:, 0] + data.quadric.k2 * terms[:, 2])
     return terms[:, 3:], quadric_bends, h
 

@@ -43,8 +43,7 @@ def _mean_stds_of_sextics(results: Sequence[Reconstruction]) -> list[float]:
         for r in results
     ]).reshape(-1, len(TERMS), 1)  # fmt: skip
     root = np.array([r.posterior.root for r in results]).reshape(-1, *2 * [len(TERMS) + 1])
-    x, y = points.reshape(-1, 2).T
-    basis = monomials(x, y, TERMS).reshape(len(results), most, len(TERMS))
+    basis = monomials(points, TERMS)
     left = basis @ root[..., :-1].swapaxes(1, 2) + root[:, None, :, -1]
     variance = np.einsum("bni,bni->bn", left, left) + (basis @ off)[..., 0] ** 2
     means: Array = np.einsum("bn,bn->b", weights, np.sqrt(variance))

@@ -254,9 +254,8 @@ class Reconstruction:
         """
         if not self.posterior.amplitude:
             return 0.0
-        x, y = self.contacts[:, :2].T
-        basis = monomials(x / self.radius, y / self.radius, exponents(1, 4))
-        height = self.height(x, y)
+        basis = monomials(self.contacts / self.radius, exponents(1, 4))
+        height = self.height(*self.contacts[:, :2].T)
         off = height - basis @ np.linalg.lstsq(basis, height, rcond=None)[0]
         return math.sqrt(float(np.mean(off**2)))
 
@@ -268,8 +267,8 @@ class Reconstruction:
     @cached_property
     def condition_number(self) -> float:
         """Condition number of the least-squares system of the coefficients, in unit radius."""
-        x, y, _ = self.contacts.T / self.radius
-        return least_squares.condition_number(monomials(x, y, exponents(3, self.patch.degree)))
+        terms = exponents(3, self.patch.degree)
+        return least_squares.condition_number(monomials(self.contacts / self.radius, terms))
 
     def moved(self, matrix: ArrayLike) -> "Reconstruction":
         """This reconstruction after a similarity (4, 4) of the world: rotation, scale above 0 and shift.

@@ -127,8 +127,7 @@ def _fields(mesh: ScanMesh, reach: float) -> tuple[Array, Array]:
         found = tree.query(origins, nearest, distance_upper_bound=reach)[1]
         local = (co[found] - origins[:, None]) @ axes
         weights = np.maximum(normals[found] @ axes[..., 2:], 0.0)
-        x, y = local.reshape(-1, 3)[:, :2].T
-        basis = weights * monomials(x, y, QUARTIC).reshape(*found.shape, -1)
+        basis = weights * monomials(local, QUARTIC)
         system = basis.swapaxes(1, 2) @ basis + POLYNOMIAL_RIDGE * np.eye(len(QUARTIC))
         fields.append(np.linalg.solve(system, basis.swapaxes(1, 2) @ (weights * local)[..., 2:])[..., 0])
     return places, np.concatenate(fields).T
@@ -140,10 +139,9 @@ def _scores(oriented: Array, fields: Array) -> Array:
     Residuals are projected off the span of 1, x and y, so that a small tilt and a shift along the normal cost
     nothing. On a quadric, neither does a small shift along the surface.
     """
-    x, y, z = oriented[0].T
-    weights = oriented[1, :, 2:]  # On a slope a height is more than the distance.
-    off = weights * (z[:, None] - monomials(x, y, QUARTIC) @ fields)
-    free = np.linalg.qr(weights * monomials(x, y, exponents(0, 1)))[0]
+    contacts, weights = oriented[0], oriented[1, :, 2:]  # On a slope a height is more than the distance.
+    off = weights * (contacts[:, 2:] - monomials(contacts, QUARTIC) @ fields)
+    free = np.linalg.qr(weights * monomials(contacts, exponents(0, 1)))[0]
     return np.sum(off**2, axis=0) - np.sum((free.T @ off) ** 2, axis=0)
 
 

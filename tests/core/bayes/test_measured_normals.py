@@ -157,7 +157,7 @@ def test_slopes_are_the_derivatives_of_the_heights():
     x, y, _ = local[0].T
 
     def height(x, y):
-        return monomials(x, y, TERMS) @ b
+        return monomials(np.stack([x, y], axis=-1), TERMS) @ b
 
     dx = (height(x + h, y) - height(x - h, y)) / (2.0 * h)
     dy = (height(x, y + h) - height(x, y - h)) / (2.0 * h)
@@ -170,8 +170,8 @@ def test_slopes_are_the_derivatives_of_the_heights():
     for direction in rng.normal(size=(5, 27)):
         misses = slopes[0] @ (1e-5 * direction)
         change = np.column_stack([
-            (monomials(x + h, y, TERMS) - monomials(x - h, y, TERMS)) @ direction,
-            (monomials(x, y + h, TERMS) - monomials(x, y - h, TERMS)) @ direction,
+            (monomials(local[0] + side, TERMS) - monomials(local[0] - side, TERMS)) @ direction
+            for side in h * np.eye(3)[:2]
         ]) / (2.0 * h)  # fmt: skip
         turned = np.column_stack([up[:, :2] + 1e-5 * change, -np.ones(9)])
         cross = np.linalg.norm(np.cross(up, turned), axis=1)
@@ -188,8 +188,7 @@ def test_the_evidence_is_that_of_heights_and_slopes_under_a_normal_distribution(
     data = sextic.sextics(local, weights, np.zeros((1, 27)), normals)
     variances = np.minimum(prior.prior_variances(np.array([0.4, 0.9])), 100.0)
     slopes, steepness = (part[0] for part in slope_equations(normals, local, weights))
-    x, y, heights = local[0].T
-    basis = np.vstack([monomials(x, y, TERMS), slopes])
+    heights, basis = local[0, :, 2], np.vstack([monomials(local[0], TERMS), slopes])
     for both in (True, False):
         count = 180 if both else 60
         some = data.heights, data.counts, both * data.slopes
@@ -442,9 +441,7 @@ def test_normals_show_the_slopes_of_the_process_too():
     def features(p):
         """Terms and whitened covariances with the contacts: the places carry the process."""
         factor = places_factor(kernel(flat, flat, variances))
-        return np.column_stack(
-            [monomials(*p.T, TERMS), np.linalg.solve(factor, kernel(flat, p, variances)).T]
-        )
+        return np.column_stack([monomials(p, TERMS), np.linalg.solve(factor, kernel(flat, p, variances)).T])
 
     def slopes(axis):
         return (features(flat + step * axis) - features(flat - step * axis)) / (2.0 * step)
