@@ -4,7 +4,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -52,7 +51,7 @@ def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
             )
     origin = found[0].points[0]  # Far from the world's origin only differences of points are exact.
     contours = [Contour(contour.points - origin) for contour in found]
-    refined = [_refined(start, contours) for start in _starts(contours)]
+    refined = (_refined(start, contours) for start in _starts(contours))
     point, tangents, misses = min(refined, key=lambda fit: float(np.sum(fit[2] ** 2)))
     _require_near(point, misses, contours)
     _require_crossing(tangents)
@@ -69,8 +68,7 @@ def in_running_order(contour: Contour, point: ArrayLike) -> Contour:
         return contour
     tangent = curves_through(r[None, None], np.ones((1, 1, len(r)), dtype=bool)).tangents[0, 0]
     order = np.argsort(np.copysign(np.linalg.norm(r, axis=1), r @ tangent), kind="stable")
-    normals = None if contour.normals is None else contour.normals[order]
-    return replace(contour, points=contour.points[order], normals=normals)
+    return contour.part(order, contour.stops)
 
 
 def _starts(contours: Sequence[Contour]) -> Array:
@@ -88,7 +86,7 @@ def _starts(contours: Sequence[Contour]) -> Array:
     squares = np.zeros(len(contacts))
     for points in thinned:
         squares += cKDTree(points).query(contacts)[0] ** 2
-    apart, starts = MAX_OFFSET * min(map(_size, contours)), np.empty((0, 3))
+    apart, starts = MAX_OFFSET * min(contour.size for contour in contours), np.empty((0, 3))
     left = squares <= 4.0 * squares.min() + len(contours) * apart**2
     while len(starts) < MOST_STARTS and left.any():
         best = contacts[np.argmin(np.where(left, squares, np.inf))]
@@ -97,13 +95,9 @@ def _starts(contours: Sequence[Contour]) -> Array:
     return starts
 
 
-def _size(contour: Contour) -> float:
-    return float(np.linalg.norm(np.ptp(contour.points, axis=0)))
-
-
 def _refined(point: Array, contours: Sequence[Contour]) -> tuple[Array, Array, Array]:
     """Runs Gauss-Newton: the point (3,), the curves' unit tangents there (c, 3) and their offsets (c,)."""
-    reach = min(map(_size, contours))
+    reach = min(contour.size for contour in contours)
     for _ in range(NEWTON_STEPS):
         near = [Contour(_near(point, contour.points)) for contour in contours]
         local = local_curves(curves_through(*stacked(point[None], [near])))[0][0]
@@ -133,8 +127,7 @@ def _near(point: Array, points: Array) -> Array:
 
 def _require_near(point: Array, misses: Array, contours: Sequence[Contour]) -> None:
     for number, (contour, offset) in enumerate(zip(contours, misses, strict=True), 1):
-        size = _size(contour)
-        gap = float(np.linalg.norm(contour.points - point, axis=1).min())
+        size, gap = contour.size, contour.distance_to(point)
         if not (offset <= MAX_OFFSET * size and gap <= MAX_GAP * size):
             raise DegenerateCurvesError(
                 f"the curves do not come near each other: curve {number}, {size:.3g} long, is "

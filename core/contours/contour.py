@@ -139,8 +139,17 @@ class Contour:
             sums = np.add.reduceat(consistently_oriented(self.normals, order, starts)[order], starts, axis=0)
             vars(self)["normals"] = sums[firsts]
 
-    def part(self, which: slice, stops: tuple[str, str]) -> "Contour":
-        """The contour of some of its contacts, which are known to be valid."""
+    @property
+    def size(self) -> float:
+        """The diagonal of the box around its points, a length."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+    def distance_to(self, point: Array) -> float:
+        """The distance of its nearest contact from a point (3,), or infinity if it has no contacts."""
+        return float(np.linalg.norm(self.points - point, axis=1).min(initial=np.inf))
+
+    def part(self, which: slice | NDArray[Any], stops: tuple[str, str] | None) -> "Contour":
+        """The contour of some of its contacts, or of all in another order, which are known to be valid."""
         found = object.__new__(Contour)
         normals = None if self.normals is None else self.normals[which]
         vars(found).update(vars(self), points=self.points[which], normals=normals, stops=stops)

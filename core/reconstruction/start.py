@@ -118,9 +118,17 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
         not len(contacts) and (noise is not None or None not in [c.noise for c in touches[i]])
         for i, (contacts, _) in zip(good, strokes, strict=True)
     ]
-    kappas, noises = np.stack([k1, k2], axis=1), (np.array(stds), np.array(known))
-    first = Start(points[good], axes, kappas, radii, curves, [contacts for contacts, _ in strokes], *noises)
-    return first, touches, errors
+    start = Start(
+        points=points[good],
+        axes=axes,
+        kappas=np.stack([k1, k2], axis=1),
+        radii=radii,
+        curves=curves,
+        strokes=[contacts for contacts, _ in strokes],
+        stds=np.array(stds),
+        stds_are_known=np.array(known),
+    )
+    return start, touches, errors
 
 
 def _errors(
@@ -149,8 +157,8 @@ def away_from(point: Array, contours: Sequence[Contour]) -> DegenerateCurvesErro
         return None
     found = misses(curves_through(*stacked(point[None], [contours])))[0, :, 0]
     away = [
-        miss if min(gap, miss) > AWAY * size else 0.0
-        for miss, gap, size in zip(found, *_gaps_and_sizes(point, contours), strict=True)
+        miss if min(contour.distance_to(point), miss) > AWAY * contour.size else 0.0
+        for miss, contour in zip(found, contours, strict=True)
     ]
     worst = int(np.argmax(away))
     if not away[worst]:
@@ -159,11 +167,6 @@ def away_from(point: Array, contours: Sequence[Contour]) -> DegenerateCurvesErro
         f"curve {worst + 1} passes the reference point at {away[worst]:.3g}, more than a tenth of its size: "
         "set the point where the curves meet"
     )
-
-
-def _gaps_and_sizes(point: Array, contours: Sequence[Contour]) -> tuple[list[float], list[float]]:
-    gaps = [float(np.linalg.norm(contour.points - point, axis=1).min()) for contour in contours]
-    return gaps, [float(np.linalg.norm(np.ptp(contour.points, axis=0))) for contour in contours]
 
 
 def _std(noise: float | None, size: int, known: list[float]) -> float:
@@ -216,15 +219,17 @@ def strokes_start(
         return None, none, errors
     good = list(firsts)
     thin = [_means(first.contacts, given[i].when[first.used]) for i, first in firsts.items()]
-    stds = [
-        _std(noise, size, [given[i].noise / math.sqrt(size)]) for i, (_, size) in zip(good, thin, strict=True)
-    ]
-    axes = np.array([first.axes for first in firsts.values()])
-    kappas = np.array([(first.k1, first.k2) for first in firsts.values()])
-    radii = np.array([first.radius for first in firsts.values()])
-    curves = curves_through(*stacked(points[good], [[]] * len(good)))
-    strokes, known = [contacts for contacts, _ in thin], np.zeros(len(good), dtype=bool)
-    start = Start(points[good], axes, kappas, radii, curves, strokes, np.array(stds), known)
+    sizes = zip(good, (size for _, size in thin), strict=True)
+    start = Start(
+        points=points[good],
+        axes=np.array([first.axes for first in firsts.values()]),
+        kappas=np.array([(first.k1, first.k2) for first in firsts.values()]),
+        radii=np.array([first.radius for first in firsts.values()]),
+        curves=curves_through(*stacked(points[good], [[]] * len(good))),
+        strokes=[contacts for contacts, _ in thin],
+        stds=np.array([_std(noise, size, [given[i].noise / math.sqrt(size)]) for i, size in sizes]),
+        stds_are_known=np.zeros(len(good), dtype=bool),
+    )
     return start, none, errors
 
 
@@ -241,11 +246,9 @@ def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
     open_ends = np.zeros_like(sides)
     for i, contour in enumerate(contours):
         open_ends[:, i] = [stop in SURFACE_ENDS for stop in contour.stops or ("", "")]
-    counted = sides
-    if open_ends.any():
-        at_point = open_ends & (np.linalg.norm(ends, axis=2) * sides < AT_POINT)
-        ends[at_point] = (np.array([-AT_POINT, AT_POINT])[:, None, None] * ahead)[at_point]
-        counted = sides | at_point
+    at_point = open_ends & (np.linalg.norm(ends, axis=2) * sides < AT_POINT)
+    ends[at_point] = (np.array([-AT_POINT, AT_POINT])[:, None, None] * ahead)[at_point]
+    counted = sides | at_point
     return closed_spline_domain(ends[counted], 1.0, open_ends[counted])
 
 
