@@ -108,8 +108,7 @@ def means(
     over, turn = contacts[order], np.array([[along[0], -along[1]], [along[1], along[0]]])
     basis = monomials(over[:, :2] @ turn, QUARTIC)
     # Singular values of the contacts are roots of those of their normal equations.
-    inverse = np.linalg.pinv(basis.T @ basis, rcond=OPEN**2, hermitian=True)
-    quartic = inverse @ (basis.T @ over[:, 2])
+    quartic = np.linalg.pinv(basis.T @ basis, rcond=OPEN**2, hermitian=True) @ (basis.T @ over[:, 2])
     over[:, 2] -= basis @ quartic
     found: Array = np.add.reduceat(over, starts, axis=0) / counts
     found[:, 2] += monomials(found[:, :2] @ turn, QUARTIC) @ quartic
@@ -217,7 +216,5 @@ def _quadric(local: Array) -> Array | None:
     basis = monomials(local, QUADRIC)
     if len(basis) < len(QUADRIC):
         return None
-    u, singular, v = np.linalg.svd(basis, full_matrices=False)
-    if singular[-1] < DETERMINED * math.sqrt(len(basis)):
-        return None
-    return v.T @ ((u.T @ local[:, 2]) / singular)
+    found, _, _, singular = np.linalg.lstsq(basis, local[:, 2], rcond=None)
+    return None if singular[-1] < DETERMINED * math.sqrt(len(basis)) else found
