@@ -91,12 +91,9 @@ def curves_through(r: Array, present: NDArray[np.bool_], normals: Array | None =
     near = far.argsort(axis=1, kind="stable")[:, :WINDOW]
     counts = present.sum(axis=1)
     farthest = near[each, np.minimum(np.maximum(counts, 1), WINDOW) - 1]
-    ahead = (r @ r[each, farthest, :, None])[..., 0]
-    along = np.copysign(distance, ahead) * present
+    along = np.copysign(distance, (r @ r[each, farthest, :, None])[..., 0]) * present
     given = present.cumsum(axis=1) - 0.5 * (counts + 1)[:, None]
-    backward = np.einsum("cn,cn->c", given, along) < 0.0
-    if backward.any():
-        along[backward] *= -1.0
+    along[np.einsum("cn,cn->c", given, along) < 0.0] *= -1.0
     scale = np.where(counts > 0, far[each, farthest], 1.0)[:, None]
     tangents, curvatures = _parabola(along[curve, near] / scale, r[curve, near] / scale[..., None])
     # The speed is 1 except for noise.

@@ -15,16 +15,14 @@ from .result import Reconstruction
 
 def mean_height_stds(results: Sequence[Reconstruction]) -> list[float]:
     """The mean_height_std of each, computed together, which is several times as fast as one by one."""
-    plain = [r for r in results if not r.posterior.amplitude]
-    of_sextics = iter(_mean_stds_of_sextics(plain))
+    of_sextics = iter(_mean_stds_of_sextics([r for r in results if not r.posterior.amplitude]))
     return [r.radius * next(of_sextics) if not r.posterior.amplitude else r.mean_height_std for r in results]
 
 
 def with_height_stds(results: Sequence[Reconstruction]) -> list[Reconstruction]:
     """Reconstructions with `known_height_std`, computed for all at once; status and message need it first."""
-    stds = mean_height_stds(results)
     # For those with a process the mean has been computed from `node_stds`, which they keep.
-    pairs = zip(results, stds, strict=True)
+    pairs = zip(results, mean_height_stds(results), strict=True)
     return [replace(r, known_height_std=std) if not r.posterior.amplitude else r for r, std in pairs]
 
 

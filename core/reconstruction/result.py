@@ -67,8 +67,8 @@ class Reconstruction:
     known_curves: Curves | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "contours", tuple(contour.copied() for contour in self.contours))
-        object.__setattr__(self, "strokes", read_only(self.strokes))
+        copies = tuple(contour.copied() for contour in self.contours)
+        vars(self).update(contours=copies, strokes=read_only(self.strokes))
 
     def __repr__(self) -> str:
         point = ", ".join(f"{x:.4g}" for x in self.frame.origin)
@@ -100,9 +100,9 @@ class Reconstruction:
     @cached_property
     def contacts(self) -> Array:
         """The fitted contacts besides the reference point, (n, 3), in the frame."""
-        curves = [contour.points - self.frame.origin for contour in self.contours]
-        strokes = self.strokes - self.frame.origin
-        return np.vstack([*(r[distances_from_point(r)[1]] for r in curves), strokes]) @ self.frame.axes
+        curves = (contour.points - self.frame.origin for contour in self.contours)
+        off_point = [r[distances_from_point(r)[1]] for r in curves]
+        return np.vstack([*off_point, self.strokes - self.frame.origin]) @ self.frame.axes
 
     @cached_property
     def misses(self) -> Array:
@@ -113,8 +113,12 @@ class Reconstruction:
     @cached_property
     def posterior(self) -> SurfacePosterior:
         """What the contacts show and leave open, in the frame and in units of L."""
-        if isinstance(self.geometry.surface, SurfacePosterior):
-            return self.geometry.surface
+        surface = self.geometry.surface
+        return surface if isinstance(surface, SurfacePosterior) else self._posterior_of_contacts
+
+    @cached_property
+    def _posterior_of_contacts(self) -> SurfacePosterior:
+        """What contacts show without measured normals or a process, in the frame and in units of L."""
         k1, k2 = self.patch.k1 * self.radius, self.patch.k2 * self.radius
         return posterior_of(k1, k2, self.contacts / self.radius, self.noise)
 
@@ -128,12 +132,10 @@ class Reconstruction:
 
     def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Standard deviation of the height at local (x, y), in their shape, with what contacts leave open."""
-        points = np.column_stack([np.ravel(v) for v in np.broadcast_arrays(x, y)])
-        outward = np.ones(len(points))
-        if self.posterior.amplitude:  # Otherwise it makes no difference.
-            outward = np.linalg.norm(self.domain.places(points), axis=1)
-        std = self._height_std(points, self.widening(outward))
-        return std.reshape(np.broadcast_shapes(np.shape(x), np.shape(y)))
+        points = np.stack(np.broadcast_arrays(x, y), axis=-1)
+        flat = points.reshape(-1, 2)
+        outward = np.linalg.norm(self.domain.places(flat), axis=1)
+        return self._height_std(flat, self.widening(outward)).reshape(points.shape[:-1])
 
     def _height_std(self, points: Array, widening: Array) -> Array:
         u, v = points.T / self.radius
@@ -170,9 +172,7 @@ class Reconstruction:
         """
         x, y, _ = self.frame.to_local(finite_array("points", points, (None, 3), LARGEST)).T
         d, std = self.geometry.derivatives(x, y), self.height_std(x, y)
-        local = np.column_stack([-d.x, -d.y, np.ones(len(x))])
-        normals = local @ self.frame.axes.T / np.linalg.norm(local, axis=1, keepdims=True)
-        return self.frame.to_world(np.column_stack([x, y, d.z])), normals, std
+        return self.frame.to_world(np.column_stack([x, y, d.z])), d.normal @ self.frame.axes.T, std
 
     def mesh(self) -> tuple[Array, NDArray[np.intp]]:
         """The patch as points (n, 3), in the frame, and counterclockwise triangles (m, 3).
@@ -325,9 +325,7 @@ class Reconstruction:
         contacts, normals = self._fitted_normals
         if not len(normals):
             return 0.0, 0.0
-        k1, k2 = self.patch.k1 * self.radius, self.patch.k2 * self.radius
-        of_contacts = posterior_of(k1, k2, self.contacts / self.radius, self.noise)
-        return contradiction(contacts, normals, of_contacts)
+        return contradiction(contacts, normals, self._posterior_of_contacts)
 
     @cached_property
     def normal_scatter(self) -> tuple[float, float]:

@@ -100,6 +100,7 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
 
 
 def _of(d: Any, key: str) -> Any:
+    """The value of a key. Raises ValueError if `d` is no dict or has none."""
     if not isinstance(d, Mapping):
         raise ValueError(f"{key}: expected it in a dict, got {shown(d)}")
     if key not in d:

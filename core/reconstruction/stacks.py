@@ -3,6 +3,7 @@
 """Touches that are fitted together, in stacks: the paper's sections III and IV, or the Bayesian fit."""
 
 from collections.abc import Sequence
+from itertools import count
 from typing import NamedTuple
 
 import numpy as np
@@ -42,17 +43,13 @@ def fitted_stack(
         start, contours, errors = strokes_start(points, touches, outward, options.noise, options.radius)
     else:
         start, contours, errors = curves_start(points, touches, outward, options.noise)
-    fit = None if start is None else _fit(start, options)
-    found: list[Reconstruction | DegenerateCurvesError] = []
-    each, i = zip(errors, contours, outward, strict=True), 0
-    for error, some, up in each:
-        if error is None:
-            assert start is not None and fit is not None
-            found.append(_result(start, fit, i, some, up, options))
-            i += 1
-        else:
-            found.append(error)
-    return found
+    if start is None:
+        return [error for error in errors if error is not None]
+    fit, row = _fit(start, options), count()
+    return [
+        error or _result(start, fit, next(row), some, up, options)
+        for error, some, up in zip(errors, contours, outward, strict=True)
+    ]
 
 
 def _fit(start: Start, options: FitOptions) -> _Fit:
@@ -130,8 +127,9 @@ def _result(
     converged = True
     if fit.posteriors is None:
         k1, k2 = start.kappas[i].tolist()
-        paper = options.method, options.weight, options.solver
-        a, converged = coefficients(curves, k1, k2, fit.degrees[i], domain, *paper)
+        a, converged = coefficients(
+            curves, k1, k2, fit.degrees[i], domain, options.method, options.weight, options.solver
+        )
         patch = MongePatch(k1, k2, a).scaled(scale)
         surface: HeightField = patch.scaled(1.0 / scale)
     else:
