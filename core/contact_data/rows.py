@@ -111,14 +111,13 @@ class RowReader:
         numbers, labels = np.vstack(self._numbers), np.concatenate(self._labels)
         if not len(numbers):
             raise ValueError(f"{self._name}: expected contacts below the header, got none")
-        normals = numbers[:, 3:6] if "nx" in self._columns else None
         return contours(
             self._name,
             labels,
-            numbers[:, :3],
-            normals,
-            numbers[:, -1] if "time" in self._columns else None,
-            self.labels,
+            points=numbers[:, :3],
+            normals=numbers[:, 3:6] if "nx" in self._columns else None,
+            times=numbers[:, -1] if "time" in self._columns else None,
+            titles=self.labels,
         )
 
     def _parse_block(self, block: str) -> tuple[list[str], Array]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arguments import Array
 from ..patch.domain import GRID, Domain
-from ..patch.monge import MongePatch, derived_monomials, exponents, monomials
+from ..patch.monge import PARTIALS, MongePatch, derived_monomials, exponents, monomials
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ def least_squares(data: Problem) -> Array:
 
 def quadratic_variation(data: Problem, domain: Domain, weight: float) -> Array:
     """The minimum of the integral of z_xx^2 + 2 z_xy^2 + z_yy^2 plus lambda f(a) (V), a linear solve."""
-    bends, quadric_bends, h = on_grid(data, domain, [(2, 0), (1, 1), (0, 2)])
+    bends, quadric_bends, h = on_grid(data, domain, PARTIALS[3:])
     factors = h * np.sqrt([1.0, 2.0, 1.0])
     share = np.sqrt(weight / len(data.basis))
     rows = [share * data.basis, *(f * bend.T for f, bend in zip(factors, bends, strict=True))]

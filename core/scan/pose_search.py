@@ -74,20 +74,22 @@ def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: 
     corners = corners_of(faces, len(co))
     oriented = np.array([r.contacts / r.radius, r.geometry.normal(*r.contacts[:, :2].T)])
     center = 0.5 * (co[corners].min(axis=(0, 1)) + co[corners].max(axis=(0, 1)))
-    size = math.dist(oriented[0].min(axis=0), oriented[0].max(axis=0))
-    mesh = mesh_of((co - center) / r.radius, corners, size)
+    mesh = mesh_of((co - center) / r.radius, corners, float(np.linalg.norm(np.ptp(oriented[0], axis=0))))
     starts = _initial_poses(oriented, mesh)
     places, residuals, slides = _registered(starts, oriented, mesh, NEAREST_TRIANGLES, FINE_STEPS)
     distinct = _distinct(places, residuals)
     poses = []
     for i in distinct[:best]:
         rotation, place = places[i, :, :3] @ r.frame.axes.T, center + r.radius * places[i, :, 3]
-        others = residuals[[j for j in distinct if j != i]]
-        alike = others < AMBIGUOUS * max(residuals[i], LEAST_RESIDUAL)
-        vertex = int(np.argmin(np.sum((co - place) ** 2, axis=1)))
-        shift = place - rotation @ r.frame.origin
-        residual = float(r.radius * residuals[i])
-        poses.append(Pose(rotation, shift, residual, vertex, bool(slides[i] or alike.any())))
+        good = residuals[distinct] < AMBIGUOUS * max(residuals[i], LEAST_RESIDUAL)
+        pose = Pose(
+            rotation,
+            translation=place - rotation @ r.frame.origin,
+            residual=float(r.radius * residuals[i]),
+            vertex=int(np.argmin(np.sum((co - place) ** 2, axis=1))),
+            is_ambiguous=bool(slides[i] or np.count_nonzero(good) > 1),  # It is good itself.
+        )
+        poses.append(pose)
     return poses
 
 

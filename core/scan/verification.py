@@ -143,7 +143,7 @@ def _azimuths_between(domain: Domain, count: int) -> list[float]:
 def _start(r: Reconstruction, surface: Surface) -> Vector | None:
     """The place of the surface nearest to the reference point along the normal, or None."""
     hits = (_below(r, surface, (0.0, 0.0, reach * r.radius), 2.0 * reach * r.radius) for reach in FOOT_REACH)
-    return next((hit for hit in hits if hit is not None), None)
+    return next(filter(None, hits), None)
 
 
 def _overlap(r: Reconstruction, surface: Surface) -> float:
