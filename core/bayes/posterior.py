@@ -162,13 +162,8 @@ class SurfacePosterior(HeightField):
 
     def _whitened_sums(self, terms: Array, ones: Array, within: Array) -> tuple[Array, Array]:
         """What `_whitened` gives for terms (27, n), ones (n,) and k(u, p) (m, n), or for sums of such."""
-        left, size = self.root[:, : len(TERMS)] @ terms, len(TERMS) + 1
-        left += self.root[:, size - 1, None] * ones
-        if not len(within):
-            return within, left
-        known = solved(self._places_factor, within)
-        left += self.root[:, size:] @ known
-        return known, left
+        known = solved(self._places_factor, within) if len(within) else within
+        return known, self.root @ np.vstack([terms, ones, known])
 
     @cached_property
     def _places_factor(self) -> Array:
