@@ -29,6 +29,7 @@ from ..paper import least_squares
 from ..patch.domain import Domain
 from ..patch.geometry import Geometry, similarity, total_absolute_curvature
 from ..patch.monge import MongePatch, exponents, monomials
+from ..patch.triangulation import patch_mesh
 from .status import Taps, contradicted, doubt, notes
 
 NEAR_POINT = 0.6  # This share of a process's deviation is left at the point (benchmarks.real).
@@ -179,7 +180,7 @@ class Reconstruction:
 
         It is as fine as the patch is certain: off the patch by at most 0.6 times mean_height_std.
         """
-        return self.geometry.mesh(MESH_SHARE * self.mean_height_std)
+        return patch_mesh(self.geometry, self.domain, MESH_SHARE * self.mean_height_std)
 
     @property
     def k1(self) -> float:

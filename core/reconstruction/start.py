@@ -177,27 +177,25 @@ def _std(noise: float | None, size: int, known: list[float]) -> float:
 def _stroke_means(
     curves: Curves, contours: Sequence[Contour], axes: Array, radius: float, point: Array, given: Given
 ) -> tuple[Array, int]:
-    """Strokes (n, 3) over the domain of curves as means, in unit radius; the least number in a mean."""
+    """Strokes (n, 3) over the domain of curves as means, in unit radius; the least number in a mean.
+
+    None are over curves that bound no domain.
+    """
     if not len(given.strokes):
         return given.strokes, 1
     local = (given.strokes - point) @ axes / radius
     local_curves = replace(curves, points=curves.points @ axes / radius, tangents=curves.tangents @ axes)
-    over = _over(local_curves, contours, local)
+    try:
+        domain = domain_of(local_curves, contours)
+    except ValueError:
+        return local[:0], 1
+    over = domain.contains(local[:, 0], local[:, 1]) & (np.abs(local[:, 2]) <= 1.0)
     return _means(local[over], given.when[over])
 
 
 def _means(contacts: Array, when: NDArray[np.intp]) -> tuple[Array, int]:
     """The means of contacts (n, 3) of strokes, and the least number in a mean; see `means`."""
     return means(contacts, toward_farthest(contacts[:, :2]), when) if len(contacts) else (contacts, 1)
-
-
-def _over(curves: Curves, contours: Sequence[Contour], strokes: Array) -> NDArray[np.bool_]:
-    """Which strokes (n, 3) are over the domain of curves, all in unit radius; none if there is no domain."""
-    try:
-        domain = domain_of(curves, contours)
-    except ValueError:
-        return np.zeros(len(strokes), dtype=bool)
-    return domain.contains(strokes[:, 0], strokes[:, 1]) & (np.abs(strokes[:, 2]) <= 1.0)
 
 
 def strokes_start(
