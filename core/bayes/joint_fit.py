@@ -81,8 +81,8 @@ def joint_fit(
     Student t distribution.
     """
     floor = np.maximum(given.noise, MISFIT)
-    axes, usual = _first_axes(given.contacts, weights, k1, k2), np.full(len(k1), USUAL_WAVINESS)
-    state = _State(axes, k1, k2, weights, prior_variances(usual), floor)
+    usual = prior_variances(np.full(len(k1), USUAL_WAVINESS))
+    state = _State(_first_axes(given.contacts, weights, k1, k2), k1, k2, weights, usual, floor)
     return _passes(given._replace(noise=floor), state, 0, through)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..arguments import Array
 from ..contours.contour import Contour
-from ..contours.curves import distances_from_point, stacked
+from ..contours.curves import distances_from_point, has_measured_normals, stacked
 from ..contours.local_geometry import Frame
 from ..patch.monge import PARTIALS, TERMS, derived_monomials
 from .posterior import SurfacePosterior
@@ -59,9 +59,10 @@ def measured_normals(contours: Sequence[Contour], frame: Frame, radius: float) -
 
     Also these normals, divided by their standard deviations, (n, 3).
     """
-    points, present, normals = stacked(frame.origin[None], [contours])
-    if normals is None:
+    if not has_measured_normals(contours):
         return np.empty((0, 3)), np.empty((0, 3))
+    points, present, normals = stacked(frame.origin[None], [contours])
+    assert normals is not None
     chosen = present & distances_from_point(points)[1] & normals.any(axis=-1)
     return points[chosen] @ frame.axes / radius, normals[chosen] @ frame.axes
 
@@ -77,7 +78,7 @@ def contradiction(contacts: Array, normals: Array, posterior: SurfacePosterior) 
     if 2 * len(normals) <= FREE:
         return 0.0, 0.0
     weights = np.ones((1, len(normals)))
-    slopes, steepness = (part[0] for part in slope_equations(normals[None], contacts[None], weights))
+    (slopes,), (steepness,) = slope_equations(normals[None], contacts[None], weights)
     covariance = slopes @ posterior.covariance @ slopes.T + np.eye(len(slopes))
     whitened = np.linalg.solve(
         np.linalg.cholesky(covariance),

@@ -3,8 +3,7 @@
 """Contours as seen from the reference point: sorted, with tangents and curvature vectors (paper, III-C)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +19,7 @@ RIDGE = 1e-12  # This share is added to the equations of r0, r1 and r2, because 
 MIN_NORMAL_STD = 1e-6  # Measured normals have at least this deviation, in radians.
 
 
-@dataclass(frozen=True, eq=False)
-class Curves:
+class Curves(NamedTuple):
     """The contours of b touches as seen from their reference points, c curves a touch, n contacts a curve.
 
     Touches with fewer curves, and curves with fewer contacts, are filled up.
@@ -44,10 +42,7 @@ class Curves:
 
     def at(self, index: int | list[int]) -> "Curves":
         """The curves of one touch, without the leading dimension, or of several."""
-        if index == [0] and len(self.points) == 1:
-            return self
-        parts: list[Any] = [part if part is None else part[index] for part in vars(self).values()]
-        return Curves(*parts)
+        return Curves._make(part if part is None else part[index] for part in self)
 
 
 def stacked(

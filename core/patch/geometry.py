@@ -34,8 +34,9 @@ class Geometry(HeightField):
     def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
         """Height, slopes and second derivatives at local (x, y)."""
         d = self.surface.derivatives(np.divide(x, self.radius), np.divide(y, self.radius))
-        bends = (values / self.radius for values in (d.xx, d.xy, d.yy))
-        return Derivatives(self.radius * d.z, d.x, d.y, *bends)
+        return Derivatives(
+            self.radius * d.z, d.x, d.y, d.xx / self.radius, d.xy / self.radius, d.yy / self.radius
+        )
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The height z at local (x, y)."""

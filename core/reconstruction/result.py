@@ -20,7 +20,6 @@ from ..contours.curves import (
     Curves,
     curves_through,
     distances_from_point,
-    has_measured_normals,
     misses,
     stacked,
 )
@@ -218,8 +217,7 @@ class Reconstruction:
         """Standard deviation of K at the point, in 1/length^2, for normally distributed k1 and k2."""
         c = 4.0 * self.posterior.covariance[2:FREE:2, 2:FREE:2]
         k = self.radius * np.array([self.patch.k2, self.patch.k1])
-        variance = k @ c @ k + c[0, 0] * c[1, 1] + c[0, 1] ** 2
-        return math.sqrt(variance) / self.radius**2
+        return math.sqrt(k @ c @ k + c[0, 0] * c[1, 1] + c[0, 1] ** 2) / self.radius**2
 
     @cached_property
     def null_space_dimension(self) -> int:
@@ -308,17 +306,15 @@ class Reconstruction:
         """The number of deviations, and the share of L, by which a curve is off what the others show."""
         if self.method != "bayes":
             return 0.0, 0.0
-        counted = [distances_from_point(contour.points - self.frame.origin)[1] for contour in self.contours]
-        curve = np.repeat(np.arange(len(counted)), list(map(np.count_nonzero, counted)))
-        curve = np.append(curve, np.full(len(self.strokes), -1))
+        off_point = (distances_from_point(contour.points - self.frame.origin)[1] for contour in self.contours)
+        sizes = [int(np.count_nonzero(counted)) for counted in off_point]
+        curve = np.repeat([*range(len(sizes)), -1], [*sizes, len(self.strokes)])
         return contradicting_curve(self.contacts / self.radius, curve, self.posterior, self.noise)
 
     @cached_property
     def _fitted_normals(self) -> tuple[Array, Array]:
         """Contacts with fitted normals and these normals, (n, 3) each, as `measured_normals` has them."""
-        if self.method != "bayes" or not has_measured_normals(self.contours):
-            return np.empty((0, 3)), np.empty((0, 3))
-        return measured_normals(self.contours, self.frame, self.radius)
+        return measured_normals(self.contours if self.method == "bayes" else (), self.frame, self.radius)
 
     @cached_property
     def contradiction(self) -> tuple[float, float]:

@@ -79,14 +79,13 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
             f"version: expected {VERSION}, got {shown(d['version'])}: this was written by another release"
         )
     method, strokes, patch = _of(d, "method"), _of(d, "strokes"), _polynomial(_of(d, "patch"))
-    contours = _contours(_of(d, "contours"), strokes is not None)
     if not isinstance(method, str) or method not in METHODS:
         raise ValueError(f"method: expected one of {', '.join(METHODS)}, got {shown(method)}")
     surface = _posterior(_of(d, "posterior")) if method == "bayes" else None
     r = Reconstruction(
         geometry=_geometry(_of(d, "geometry"), surface or patch),
         patch=patch,
-        contours=contours,
+        contours=_contours(_of(d, "contours"), may_be_none=strokes is not None),
         noise=number("noise", _of(d, "noise"), least=0.0),
         method=method,
         converged=_converged(_of(d, "converged")),
@@ -143,8 +142,7 @@ def _polynomial(d: Any) -> MongePatch:
 def _contours(contours: Any, may_be_none: bool) -> tuple[Contour, ...]:
     if not isinstance(contours, Sequence) or not (contours or may_be_none):
         raise ValueError(f"contours: expected a list of some, got {shown(contours)}")
-    names = [field.name for field in fields(Contour)]
-    return tuple(Contour(**{name: _of(contour, name) for name in names}) for contour in contours)
+    return tuple(Contour(**{f.name: _of(contour, f.name) for f in fields(Contour)}) for contour in contours)
 
 
 def _taps(d: Any) -> Taps | None:

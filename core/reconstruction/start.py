@@ -4,7 +4,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -184,7 +183,7 @@ def _stroke_means(
     if not len(given.strokes):
         return given.strokes, 1
     local = (given.strokes - point) @ axes / radius
-    local_curves = replace(curves, points=curves.points @ axes / radius, tangents=curves.tangents @ axes)
+    local_curves = curves._replace(points=curves.points @ axes / radius, tangents=curves.tangents @ axes)
     try:
         domain = domain_of(local_curves, contours)
     except ValueError:

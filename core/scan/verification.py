@@ -104,8 +104,12 @@ def _spread(name: str, offsets: Array) -> dict[str, float]:
     """Mean, median, maximum and root mean square of distances by name; empty if there are none."""
     if not len(offsets):
         return {}
-    rms = math.sqrt(np.mean(offsets**2))
-    values = {"mean": offsets.mean(), "median": np.median(offsets), "max": offsets.max(), "rms": rms}
+    values = {
+        "mean": offsets.mean(),
+        "median": np.median(offsets),
+        "max": offsets.max(),
+        "rms": np.sqrt(np.mean(offsets**2)),
+    }
     return {f"{name}_distance_{key}": float(value) for key, value in values.items()}
 
 
