@@ -34,16 +34,11 @@ def kernel(p: Array, q: Array, variances: Array) -> Array:
     return one
 
 
-def kernels(p: Array, q: Array) -> list[Array]:
-    """Kernels of unit variance, (..., n, m), for each of LENGTHS."""
-    return _maternes(distances(p, q))
-
-
 def weighted_kernel(p: Array, q: Array, variances: Array, weights: Array) -> Array:
     """k(p, q) @ weights at points (n, 2) and (m, 2), (n,)."""
     total, rows = np.empty(len(p)), max(1, DISTANCES_AT_ONCE // max(len(q), 1))
     for start in range(0, len(p), rows):
-        one, other = _maternes(distances(p[start : start + rows], q))
+        one, other = kernels(p[start : start + rows], q)
         total[start : start + rows] = one @ (variances[0] * weights) + other @ (variances[1] * weights)
     return total
 
@@ -57,11 +52,15 @@ def distances(p: Array, q: Array) -> Array:
     return np.sqrt(apart, out=apart)
 
 
-def _maternes(distance: Array) -> list[Array]:
-    """M of distances (...), which are used up, for each of LENGTHS; one follows from the other."""
+def kernels(p: Array, q: Array) -> list[Array]:
+    """Kernels of unit variance at points (..., n, 2) and (..., m, 2), (..., n, m), for each of LENGTHS.
+
+    One follows from the other.
+    """
     # This works in place, because passes over memory take most of the time.
     short, long = LENGTHS.tolist()
-    a = np.multiply(distance, math.sqrt(3.0) / long, out=distance)
+    a = distances(p, q)
+    a *= math.sqrt(3.0) / long
     decay, ratio = np.exp(-a), long / short
     other = ratio * a
     other += 1.0

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How far a patch is from its contacts and from a mesh (paper, V)."""
 
-import heapq
 import math
 from collections.abc import Iterator
 
@@ -133,14 +132,10 @@ def _azimuths_between(domain: Domain, count: int) -> list[float]:
     x, y = domain.ends.T
     lines = np.sort(np.arctan2(y, x) % math.pi)
     widths = np.diff(lines, append=lines[0] + math.pi)
-    inside = [0] * len(lines)
-    heap = [(-width, i) for i, width in enumerate(widths.tolist())]
-    heapq.heapify(heap)
+    inside = np.zeros(len(lines), dtype=np.intp)
     for _ in range(count):
-        _, i = heap[0]
-        inside[i] += 1
-        heapq.heapreplace(heap, (-float(widths[i]) / (inside[i] + 1), i))
-    shares = zip(lines.tolist(), widths.tolist(), inside, strict=True)
+        inside[np.argmax(widths / (inside + 1))] += 1
+    shares = zip(lines.tolist(), widths.tolist(), inside.tolist(), strict=True)
     return [line + width * k / (n + 1) for line, width, n in shares for k in range(1, n + 1)]
 
 
