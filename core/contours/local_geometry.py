@@ -70,8 +70,8 @@ def principal_curvatures(
     return mean - half, mean + half, np.where(umbilic, 0.0, 0.5 * np.arctan2(-b, -a))
 
 
-def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array, Array]:
-    """Darboux frames (b, 3, 3) about normals (b, 3); kappa1 and kappa2 in unit radius and the radii L, (b,).
+def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array]:
+    """Darboux frames (b, 3, 3) about normals (b, 3); kappa1 and kappa2 (b, 2) in unit radius; radii L (b,).
 
     d1 is within 90 degrees of the first curve's tangent, and is this tangent at an umbilic. L is the largest
     distance of a contact from the point in the tangent plane.
@@ -90,7 +90,7 @@ def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array, Array
     k1, k2, theta = principal_curvatures(angles, kappas, curves.present.any(axis=2))
     c, s = np.cos(theta), np.sin(theta)
     directions = plane @ np.array([[c, -s], [s, c]]).transpose(2, 0, 1)
-    return np.concatenate([directions, n[..., None]], axis=2), k1, k2, radius
+    return np.concatenate([directions, n[..., None]], axis=2), np.stack([k1, k2], axis=1), radius
 
 
 def degeneracy(

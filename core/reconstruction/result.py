@@ -138,6 +138,7 @@ class Reconstruction:
         return self._height_std(flat, self.widening(outward)).reshape(points.shape[:-1])
 
     def _height_std(self, points: Array, widening: Array) -> Array:
+        """`height_std` (n,) at local points (n, 2), given `widening` (n,) there."""
         u, v = points.T / self.radius
         std = widening * self.posterior.height_std(u, v)
         if self.method != "bayes":  # A patch by another method departs from the posterior's mean, too.
@@ -299,6 +300,7 @@ class Reconstruction:
 
     @cached_property
     def _verdict(self) -> tuple[str, str]:
+        """The status and its sentence, without notes."""
         return contradicted(self) or doubt(self) or ("ok", "The patch describes its contacts.")
 
     @cached_property

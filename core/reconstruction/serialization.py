@@ -108,12 +108,14 @@ def _of(d: Any, key: str) -> Any:
 
 
 def _converged(value: Any) -> bool:
+    """The value, if it is True or False. Raises ValueError for anything else."""
     if not isinstance(value, bool):
         raise ValueError(f"converged: expected True or False, as to_dict gives it, got {shown(value)}")
     return value
 
 
 def _geometry(d: Any, surface: SurfacePosterior | MongePatch) -> Geometry:
+    """The geometry with this surface: a posterior in unit radius, or a patch in the caller's unit."""
     frame, radius = _of(d, "frame"), number("radius", _of(d, "radius"), least=SMALLEST)
     axes = finite_array("axes", _of(frame, "axes"), (3, 3))
     if np.abs(axes.T @ axes - np.eye(3)).max() > ORTHONORMAL or np.linalg.det(axes) < 0.0:
@@ -131,6 +133,7 @@ def _geometry(d: Any, surface: SurfacePosterior | MongePatch) -> Geometry:
 
 
 def _polynomial(d: Any) -> MongePatch:
+    """The polynomial (1) that `polynomial_dict` wrote."""
     coefficients = finite_array("coefficients", _of(d, "coefficients"), (None,))
     if len(coefficients) not in COEFFICIENTS:
         raise ValueError(
@@ -140,6 +143,7 @@ def _polynomial(d: Any) -> MongePatch:
 
 
 def _contours(contours: Any, may_be_none: bool) -> tuple[Contour, ...]:
+    """The contours of a list of dicts, which is empty only if there `may_be_none`."""
     if not isinstance(contours, Sequence) or not (contours or may_be_none):
         raise ValueError(f"contours: expected a list of some, got {shown(contours)}")
     return tuple(Contour(**{f.name: _of(contour, f.name) for f in fields(Contour)}) for contour in contours)
@@ -154,11 +158,13 @@ def _taps(d: Any) -> Taps | None:
 
 
 def _posterior_dict(posterior: SurfacePosterior) -> dict[str, Any]:
+    """A posterior as plain values, with its sextic if it has one."""
     values = {f.name: getattr(posterior, f.name) for f in fields(posterior)}
     return plain(values | {"sextic": posterior.sextic and _posterior_dict(posterior.sextic)})
 
 
 def _posterior(d: Any) -> SurfacePosterior:
+    """The posterior, in unit radius, that `_posterior_dict` wrote."""
     size, places = len(TERMS), finite_array("places", _of(d, "places") or np.empty((0, 2)), (None, 2))
     shapes: dict[str, tuple[int | None, ...]] = {
         "mean": (size,),

@@ -100,7 +100,7 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
     if not good:
         return None, touches, errors
     curves = curves.at(good)
-    axes, k1, k2, radii = darboux_frames(curves, normals[good])
+    axes, kappas, radii = darboux_frames(curves, normals[good])
     strokes = [
         _stroke_means(curves.at(row), touches[i], axes[row], radii[row], points[i], given[i])
         for row, i in enumerate(good)
@@ -117,16 +117,8 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
         not len(contacts) and (noise is not None or None not in [c.noise for c in touches[i]])
         for i, (contacts, _) in zip(good, strokes, strict=True)
     ]
-    start = Start(
-        points=points[good],
-        axes=axes,
-        kappas=np.stack([k1, k2], axis=1),
-        radii=radii,
-        curves=curves,
-        strokes=[contacts for contacts, _ in strokes],
-        stds=np.array(stds),
-        stds_are_known=np.array(known),
-    )
+    contacts = [contacts for contacts, _ in strokes]
+    start = Start(points[good], axes, kappas, radii, curves, contacts, np.array(stds), np.array(known))
     return start, touches, errors
 
 

@@ -197,6 +197,7 @@ def _farthest(distances: Array) -> float:
 
 
 def _too_few(count: int) -> DegenerateCurvesError:
+    """The error for strokes with only this many contacts."""
     return DegenerateCurvesError(
         f"the strokes have {count} contacts around the point, and {len(QUADRIC)} are needed: "
         "measure more, or use a larger radius"
