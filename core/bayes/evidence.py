@@ -84,10 +84,9 @@ def hyperparameters(heights: Array, counts: Array, slopes: Array, floor: Array) 
 
     They are found in groups that fit into a processor's cache.
     """
-    noises, prior, found = noise_grid(heights, counts, floor), prior_variances(WAVINESS), []
-    for start in range(0, len(noises), GROUP):
-        at = slice(start, start + GROUP)
-        found.append(neg2_log_evidence(heights[at], counts[at], slopes[at], prior, noises[at]))
+    noises, prior = noise_grid(heights, counts, floor), prior_variances(WAVINESS)
+    groups = [slice(start, start + GROUP) for start in range(0, len(noises), GROUP)]
+    found = [neg2_log_evidence(heights[g], counts[g], slopes[g], prior, noises[g]) for g in groups]
     unusual = (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD) ** 2  # -2 log of the waviness's prior
     p = likelihoods(np.concatenate(found) + unusual[:, None])
     noise = np.sqrt(np.einsum("bn,bn->b", p.sum(axis=1), noises**2))

@@ -84,5 +84,4 @@ def _derived_matern(apart: Array, length: float) -> Array:
     slope = -b * np.exp(-a)
     height = (1.0 + a) * np.exp(-a)
     bend = -b * slope / np.maximum(a, 1e-300)  # It is multiplied by less than a^2.
-    second = slope + bend * x**2, bend * x * y, slope + bend * y**2
-    return np.array([height, slope * x, slope * y, *second])
+    return np.array([height, slope * x, slope * y, slope + bend * x**2, bend * x * y, slope + bend * y**2])

@@ -83,9 +83,7 @@ def _starts(contours: Sequence[Contour]) -> Array:
     thinned = [contour.points[:: -(-len(contour.points) // MOST_SEARCHED)] for contour in contours]
     contacts = np.vstack(thinned)
     contacts = contacts[:: -(-len(contacts) * len(thinned) // MAX_QUERIES)]
-    squares = np.zeros(len(contacts))
-    for points in thinned:
-        squares += cKDTree(points).query(contacts)[0] ** 2
+    squares = np.sum([cKDTree(points).query(contacts)[0] ** 2 for points in thinned], axis=0)
     apart, starts = MAX_OFFSET * min(contour.size for contour in contours), np.empty((0, 3))
     left = squares <= 4.0 * squares.min() + len(contours) * apart**2
     while len(starts) < MOST_STARTS and left.any():
@@ -126,6 +124,7 @@ def _near(point: Array, points: Array) -> Array:
 
 
 def _require_near(point: Array, misses: Array, contours: Sequence[Contour]) -> None:
+    """Raises DegenerateCurvesError if a curve misses the point (3,), by `misses` (c,), or has a gap there."""
     for number, (contour, offset) in enumerate(zip(contours, misses, strict=True), 1):
         size, gap = contour.size, contour.distance_to(point)
         if not (offset <= MAX_OFFSET * size and gap <= MAX_GAP * size):
@@ -137,6 +136,7 @@ def _require_near(point: Array, misses: Array, contours: Sequence[Contour]) -> N
 
 
 def _require_crossing(tangents: Array) -> None:
+    """Raises DegenerateCurvesError if all unit tangents (c, 3) are the same line."""
     sines = np.linalg.norm(np.cross(tangents[:, None], tangents[None]), axis=2)
     if sines.max() < math.sin(LEAST_ANGLE):
         raise DegenerateCurvesError(

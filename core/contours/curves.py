@@ -26,7 +26,8 @@ class Curves(NamedTuple):
 
     points : (b, c, n, 3), contacts other than the reference point, relative to it, in running order
     present : (b, c, n), which of them are contacts
-    along : (b, c, n), their signed distances from the point along the curve's direction, ascending
+    along : (b, c, n), their signed distances from the point along the curve's direction, ascending; infinite
+        where there is none
     tangents : (b, c, 3), unit, pointing the way the contour's points were given; 0 where there is no curve
     curvatures : (b, c, 3), the curvature vectors r''(s) at the point, in 1/length
     normals : (b, c, n, 3), measured normals over their standard deviation in radians, 0 where there are
@@ -125,8 +126,7 @@ def local_curves(curves: Curves) -> tuple[Array, Array]:
     shape = curves.present.shape
     present = curves.present.reshape(-1, shape[-1])
     curve = np.arange(len(present))[:, None]
-    distance = np.where(present, np.abs(curves.along.reshape(present.shape)), np.inf)
-    order = distance.argsort(axis=1, kind="stable")[:, :WINDOW]
+    order = np.abs(curves.along.reshape(present.shape)).argsort(axis=1, kind="stable")[:, :WINDOW]
     near = present[curve, order]
     r = curves.points.reshape(*present.shape, 3)[curve, order]
     r *= near[..., None]

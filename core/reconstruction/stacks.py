@@ -127,9 +127,8 @@ def _result(
     converged = True
     if fit.posteriors is None:
         k1, k2 = start.kappas[i].tolist()
-        a, converged = coefficients(
-            curves, k1, k2, fit.degrees[i], domain, options.method, options.weight, options.solver
-        )
+        paper = options.method, options.weight, options.solver
+        a, converged = coefficients(curves, k1, k2, fit.degrees[i], domain, *paper)
         patch = MongePatch(k1, k2, a).scaled(scale)
         surface: HeightField = patch.scaled(1.0 / scale)
     else:
@@ -147,11 +146,15 @@ def _result(
 
 
 def _curves(start: Start, fit: _Fit, i: int) -> Curves:
-    """The curves of touch i, in its frame and in unit radius."""
+    """The curves of touch i without normals, in its frame and in unit radius."""
     curves, axes, radius = start.curves.at(i), fit.axes[i], fit.radii[i]
-    local = fit.contacts[i, : curves.present.size].reshape(curves.points.shape)
-    along, curvatures = curves.along / radius, radius * (curves.curvatures @ axes)
-    return Curves(local, curves.present, along, curves.tangents @ axes, curvatures)
+    return curves._replace(
+        points=fit.contacts[i, : curves.present.size].reshape(curves.points.shape),
+        along=curves.along / radius,
+        tangents=curves.tangents @ axes,
+        curvatures=radius * (curves.curvatures @ axes),
+        normals=None,
+    )
 
 
 def _domain(curves: Curves, strokes: Array, contours: Sequence[Contour]) -> Domain | DegenerateCurvesError:
