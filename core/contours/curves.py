@@ -43,6 +43,8 @@ class Curves(NamedTuple):
 
     def at(self, index: int | list[int]) -> "Curves":
         """The curves of one touch, without the leading dimension, or of several."""
+        if index == [0] and len(self.points) == 1:  # This saves a twentieth of a fit.
+            return self
         return Curves._make(part if part is None else part[index] for part in self)
 
 

@@ -79,7 +79,7 @@ def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array]:
     tangents = curves.tangents
     e1 = tangents[:, 0] - np.einsum("bi,bi->b", tangents[:, 0], n)[:, None] * n
     e1 /= np.sqrt(np.einsum("bi,bi->b", e1, e1))[:, None]
-    plane = np.stack([e1, np.array(cross(n.T, e1.T)).T], axis=2)
+    plane = np.array([e1.T, cross(n.T, e1.T)]).transpose(2, 1, 0)
     flat = curves.points @ plane[:, None]
     radius = np.sqrt((np.einsum("...i,...i->...", flat, flat) * curves.present).max(axis=(1, 2)))
     # By Meusnier the normal curvature is the normal part of the curvature vector, with its sign: the paper's
@@ -90,7 +90,7 @@ def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array]:
     k1, k2, theta = principal_curvatures(angles, kappas, curves.present.any(axis=2))
     c, s = np.cos(theta), np.sin(theta)
     directions = plane @ np.array([[c, -s], [s, c]]).transpose(2, 0, 1)
-    return np.concatenate([directions, n[..., None]], axis=2), np.stack([k1, k2], axis=1), radius
+    return np.concatenate([directions, n[..., None]], axis=2), np.array([k1, k2]).T, radius
 
 
 def degeneracy(

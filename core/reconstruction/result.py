@@ -134,8 +134,10 @@ class Reconstruction:
         """Standard deviation of the height at local (x, y), in their shape, with what contacts leave open."""
         points = np.stack(np.broadcast_arrays(x, y), axis=-1)
         flat = points.reshape(-1, 2)
-        outward = np.linalg.norm(self.domain.places(flat), axis=1)
-        return self._height_std(flat, self.widening(outward)).reshape(points.shape[:-1])
+        # Without a process nothing is widened, wherever in the domain a place is.
+        places = self.domain.places(flat) if self.posterior.amplitude else flat
+        widening = self.widening(np.linalg.norm(places, axis=1))
+        return self._height_std(flat, widening).reshape(points.shape[:-1])
 
     def _height_std(self, points: Array, widening: Array) -> Array:
         """`height_std` (n,) at local points (n, 2), given `widening` (n,) there."""

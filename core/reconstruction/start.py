@@ -235,10 +235,11 @@ def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
     open_ends = np.zeros_like(sides)
     for i, contour in enumerate(contours):
         open_ends[:, i] = [stop in SURFACE_ENDS for stop in contour.stops or ("", "")]
-    at_point = open_ends & (np.linalg.norm(ends, axis=2) * sides < AT_POINT)
-    ends[at_point] = (np.array([-AT_POINT, AT_POINT])[:, None, None] * ahead)[at_point]
-    counted = sides | at_point
-    return closed_spline_domain(ends[counted], 1.0, open_ends[counted])
+    if open_ends.any():
+        at_point = open_ends & (np.linalg.norm(ends, axis=2) * sides < AT_POINT)
+        ends[at_point] = (np.array([-AT_POINT, AT_POINT])[:, None, None] * ahead)[at_point]
+        sides |= at_point
+    return closed_spline_domain(ends[sides], 1.0, open_ends[sides])
 
 
 def too_coarse(gap: float, size: float) -> DegenerateCurvesError:
