@@ -247,7 +247,7 @@ def cramer_rao(case):
     contacts = np.vstack([c.points for c in case.contours]) - case.point
     contacts = contacts[np.linalg.norm(contacts, axis=1) > 0.0] @ case.axes
     radius = np.abs(contacts).max()
-    inverse = np.linalg.pinv(monomials(*contacts[:, :2].T / radius, exponents(1, 4)), rcond=1e-6)
+    inverse = np.linalg.pinv(monomials(contacts / radius, exponents(1, 4)), rcond=1e-6)
     rows = 2.0 * case.noise / radius**2 * inverse[[2, 4]]
     draws = rows @ np.random.default_rng(0).normal(size=(rows.shape[1], 1000))
     return float(np.median(np.abs(draws).max(axis=0)))
@@ -259,9 +259,9 @@ def noise_limit(case, surface):
     x, y, z = (contacts @ case.axes).T
     there = above(surface, case.axes, case.kappas, np.column_stack([x, y]))
     terms = exponents(1, 2)
-    b = np.linalg.lstsq(monomials(x, y, terms), z - there @ case.axes[:, 2], rcond=None)[0]
+    b = np.linalg.lstsq(monomials(contacts @ case.axes, terms), z - there @ case.axes[:, 2], rcond=None)[0]
     over = case.hold_out @ case.axes
-    return 1e3 * float(np.mean(np.abs(monomials(over[:, 0], over[:, 1], terms) @ b)))
+    return 1e3 * float(np.mean(np.abs(monomials(over, terms) @ b)))
 
 
 # Measures --------------------------------------------------------------------------------------------

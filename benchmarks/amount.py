@@ -173,7 +173,7 @@ def best_polynomial(over, degree):
     from scipy.optimize import linprog
 
     radius = np.abs(over).max()
-    basis, z = monomials(*over[:, :2].T / radius, exponents(1, degree)), over[:, 2] / radius
+    basis, z = monomials(over / radius, exponents(1, degree)), over[:, 2] / radius
     (points, terms), slack = basis.shape, np.eye(len(basis))
     least = linprog(
         np.repeat([0.0, 1.0 / points], [terms, points]),
@@ -190,8 +190,8 @@ def cramer_rao(case):
     contacts = contacts[np.linalg.norm(contacts, axis=1) > 0.0] @ case.axes
     over, radius, terms = case.hold_out @ case.axes, np.abs(contacts).max(), exponents(1, 4)
     # Blind directions are 0 except for rounding; the faintest visible one is 0.04 of the clearest.
-    inverse = np.linalg.pinv(monomials(*contacts[:, :2].T / radius, terms), rcond=1e-2)
-    std = case.noise * np.linalg.norm(monomials(*over[:, :2].T / radius, terms) @ inverse, axis=1)
+    inverse = np.linalg.pinv(monomials(contacts / radius, terms), rcond=1e-2)
+    std = case.noise * np.linalg.norm(monomials(over / radius, terms) @ inverse, axis=1)
     return 1e3 * np.sqrt(2.0 / np.pi) * std.mean()
 
 

@@ -80,7 +80,7 @@ def matern_on_quadric(contacts, noisiest=0.1):
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
     terms = exponents(0, 2)
-    basis = monomials(*contacts[:, :2].T, terms)
+    basis = monomials(contacts, terms)
     b = np.linalg.lstsq(basis, contacts[:, 2], rcond=None)[0]
     left = contacts[:, 2] - basis @ b
     scale = max(left.std(), 1e-9)
@@ -94,7 +94,7 @@ def matern_on_quadric(contacts, noisiest=0.1):
         noisy = process.predict(points, return_std=True)[1] ** 2 - process.kernel_.k2.noise_level
         return scale * np.sqrt(np.maximum(noisy, 0.0))
 
-    return lambda points: monomials(*points.T, terms) @ b + scale * process.predict(points), height_std
+    return lambda points: monomials(points, terms) @ b + scale * process.predict(points), height_std
 
 
 def radial_basis(case, kernel, **options):
@@ -112,7 +112,7 @@ def moving_least_squares(case, width=0.5):
     """
     r, contacts, _ = _start(case)
     terms = exponents(0, 2)
-    basis = monomials(*contacts[:, :2].T, terms)
+    basis = monomials(contacts, terms)
     products = (basis[:, :, None] * basis[:, None]).reshape(len(basis), -1)
 
     def height(points):
@@ -120,7 +120,7 @@ def moving_least_squares(case, width=0.5):
         weights = np.exp(-0.5 * np.sum(apart**2, axis=2) / width**2)
         normal = (weights @ products).reshape(-1, len(terms), len(terms))
         coefficients = np.linalg.solve(normal, (weights @ (basis * contacts[:, 2:]))[..., None])[..., 0]
-        return np.sum(monomials(*points.T, terms) * coefficients, axis=1)
+        return np.sum(monomials(points, terms) * coefficients, axis=1)
 
     return _scaled_fit(r, height)
 
@@ -129,13 +129,12 @@ def jet(case, degree):
     """A polynomial with all terms, by least squares in the paper's frame; kappas by its shape operator."""
     r, contacts, radius = _start(case)
     terms = exponents(1, degree)
-    x, y, z = contacts.T
-    b = np.linalg.lstsq(monomials(x, y, terms), z, rcond=1e-10)[0]
+    b = np.linalg.lstsq(monomials(contacts, terms), contacts[:, 2], rcond=1e-10)[0]
     slopes, second = b[:2], np.array([[2.0 * b[2], b[3]], [b[3], 2.0 * b[4]]])
     first = np.eye(2) + np.outer(slopes, slopes)
     operator = np.linalg.solve(first, second) / np.sqrt(1.0 + slopes @ slopes)
     kappas = np.sort(np.linalg.eigvals(operator).real) / radius
-    return _scaled_fit(r, lambda points: monomials(*points.T, terms) @ b)._replace(kappas=tuple(kappas))
+    return _scaled_fit(r, lambda points: monomials(points, terms) @ b)._replace(kappas=tuple(kappas))
 
 
 # Splines ---------------------------------------------------------------------------------------------

@@ -329,10 +329,10 @@ def _turned(scan, r):
     azimuths, reach = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(DENSE), 0.6 * r.radius
     shares = np.sqrt((np.arange(DENSE) + 0.5) / DENSE)
     flat = reach * np.column_stack([shares * np.cos(azimuths), shares * np.sin(azimuths)])
-    x, y, z = r.frame.to_local(scan.above(r, flat)).T / reach
-    if len(x) < DENSE / 2:
+    over = r.frame.to_local(scan.above(r, flat)) / reach
+    if len(over) < DENSE / 2:
         return False
-    sx, sy, xx, xy, yy = np.linalg.lstsq(monomials(x, y, exponents(1, 4)), z, rcond=None)[0][:5]
+    sx, sy, xx, xy, yy = np.linalg.lstsq(monomials(over, exponents(1, 4)), over[:, 2], rcond=None)[0][:5]
     if 2.0 * math.hypot(xx - yy, xy) * r.radius / reach <= ALIKE:
         return False
     return math.hypot(0.5 * math.atan2(-xy, yy - xx), sx, sy) > math.radians(TURNED)

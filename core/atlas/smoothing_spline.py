@@ -247,8 +247,8 @@ def penalty(order: int) -> tuple[Array, float, float]:
         comb(order, k) * kron(a.T @ a, b.T @ b)
         for k, (a, b) in enumerate(zip(steps[::-1], steps, strict=True))
     )
-    x, y = (axis.ravel() for axis in np.meshgrid(*2 * [np.linspace(-1.0, 1.0, SIDE)], indexing="ij"))
-    basis, volumes = np.linalg.qr(monomials(x, y, exponents(0, order - 1)))
+    grid = np.stack(np.meshgrid(*2 * [np.linspace(-1.0, 1.0, SIDE)], indexing="ij"), axis=-1)
+    basis, volumes = np.linalg.qr(monomials(grid.reshape(-1, 2), exponents(0, order - 1)))
     log_determinant = float(np.linalg.slogdet(matrix.toarray() + basis @ basis.T)[1])
     return _band(matrix), log_determinant, float(np.log(np.abs(np.diag(volumes)[3:])).sum())
 

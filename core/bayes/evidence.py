@@ -45,13 +45,11 @@ class Hyperparameters(NamedTuple):
     process: Array = np.zeros(2)
 
 
-def neg2_log_evidence(
-    heights: Array, counts: Array, slopes: Array | None, prior: Array, noises: Array
-) -> Array:
+def neg2_log_evidence(heights: Array, counts: Array, slopes: Array, prior: Array, noises: Array) -> Array:
     """-2 log marginal likelihood of b touches without a process, (b, w, n), up to a constant.
 
     heights : (b, 28, 28), [[gram, rhs], [rhs', y'y]] of `counts` contacts (b,); slopes : (b, 28, 28),
-        likewise, of measured normals in units of their deviations
+        likewise, of measured normals in units of their deviations; 0 without any
     prior : (w, 27), variances; noises : (b, n)
 
     With the precision A = gram / noise^2 + slopes' gram + prior^-1 (Rasmussen and Williams 2006, equation
@@ -59,9 +57,7 @@ def neg2_log_evidence(
     Cholesky factor of [[A, rhs], [rhs', y'y / noise^2]] has log |A| in its diagonal, and the last two terms
     in the last of it.
     """
-    bordered = heights[:, None] / (noises**2)[..., None, None]
-    if slopes is not None:
-        bordered += slopes[:, None]
+    bordered = heights[:, None] / (noises**2)[..., None, None] + slopes[:, None]
     # Adding 1 changes no ratio of likelihoods and keeps rounding from leaving less than 0 over.
     bordered[..., -1, -1] += 1.0 + ROUNDING * np.einsum("bnii->bn", bordered)
     bordered = bordered[:, None].repeat(len(prior), axis=1)
@@ -81,20 +77,19 @@ def noise_grid(heights: Array, counts: Array, floor: Array) -> Array:
     return floor[:, None] * largest[:, None] ** np.linspace(0.0, 1.0, NOISES)
 
 
-def hyperparameters(heights: Array, counts: Array, slopes: Array | None, floor: Array) -> Hyperparameters:
-    """Waviness and noise of b touches without a process: averages over the grid.
+def hyperparameters(heights: Array, counts: Array, slopes: Array, floor: Array) -> Hyperparameters:
+    """Waviness and noise, at least `floor` (b,), of b touches without a process: averages over the grid.
+
+    heights, counts, slopes : as in `neg2_log_evidence`
 
     They are found in groups that fit into a processor's cache.
     """
-    noises, prior, found = noise_grid(heights, counts, floor), prior_variances(WAVINESS), []
-    for start in range(0, len(noises), GROUP):
-        at = slice(start, start + GROUP)
-        some = None if slopes is None else slopes[at]
-        found.append(neg2_log_evidence(heights[at], counts[at], some, prior, noises[at]))
+    noises, prior = noise_grid(heights, counts, floor), prior_variances(WAVINESS)
+    groups = [slice(start, start + GROUP) for start in range(0, len(noises), GROUP)]
+    found = [neg2_log_evidence(heights[g], counts[g], slopes[g], prior, noises[g]) for g in groups]
     unusual = (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD) ** 2  # -2 log of the waviness's prior
     p = likelihoods(np.concatenate(found) + unusual[:, None])
-    by_noise = p.sum(axis=1)
-    noise = np.sqrt(np.einsum("bn,bn->b", by_noise, noises**2))
+    noise = np.sqrt(np.einsum("bn,bn->b", p.sum(axis=1), noises**2))
     return Hyperparameters(p.sum(axis=2) @ prior, noise)
 
 
@@ -120,9 +115,9 @@ def process_hyperparameters(
     p = likelihoods(found.reshape(1, len(kernels), -1), POWER).reshape(found.shape)
     noise = np.sqrt(p.sum(axis=(0, 1)) @ noises**2)
     sextics = np.minimum(prior_variances(SEXTIC_WAVINESS), MOST_VARIANCE)
-    equations = (rows @ rows.T)[None], np.array([rows.shape[1]]), None
+    gram, count = (rows @ rows.T)[None], np.array([rows.shape[1]])
     # What is added there to -2 log likelihood is taken off again.
-    without = neg2_log_evidence(*equations, sextics, np.array([[most]])) - 1.0
+    without = neg2_log_evidence(gram, count, np.zeros_like(gram), sextics, np.array([[most]])) - 1.0
     best = min(found.min(), without.min())
     use_gp = np.exp(0.5 * (best - found)).mean() > ODDS * np.exp(0.5 * (best - without)).mean()
     return Hyperparameters(prior, noise, p.sum(axis=2) @ AMPLITUDES**2), bool(use_gp)

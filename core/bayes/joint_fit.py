@@ -8,7 +8,7 @@ touches at once: with one touch, most of the time goes into calling numpy.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +52,7 @@ class Observations(NamedTuple):
 
     def at(self, which: NDArray[np.bool_]) -> "Observations":
         """Those of some of the touches."""
-        parts: list[Any] = [values[which] for values in self]
-        return Observations(*parts)
+        return Observations._make(values[which] for values in self)
 
 
 class _State(NamedTuple):
@@ -82,8 +81,8 @@ def joint_fit(
     Student t distribution.
     """
     floor = np.maximum(given.noise, MISFIT)
-    axes, usual = _first_axes(given.contacts, weights, k1, k2), np.full(len(k1), USUAL_WAVINESS)
-    state = _State(axes, k1, k2, weights, prior_variances(usual), floor)
+    usual = prior_variances(np.full(len(k1), USUAL_WAVINESS))
+    state = _State(_first_axes(given.contacts, weights, k1, k2), k1, k2, weights, usual, floor)
     return _passes(given._replace(noise=floor), state, 0, through)
 
 
@@ -129,7 +128,7 @@ def _pass(
     data = sextics(local, state.weights, expected, normals, through)
     hyper = _hyperparameters(state, data, given.noise, step)
     found = mean_given(data, hyper)
-    if data.slopes is not None:
+    if normals.size:
         data = with_scatter(data, found, normals)
         found = mean_given(data, hyper)
     mean, weights = expected + found, state.weights
@@ -143,7 +142,7 @@ def _pass(
         settled &= (np.abs(weights - state.weights).max(axis=1) <= SETTLED_WEIGHT) | (step == PASSES - 1)
     # Axes follow the first curve in the end only, because the prior depends on them.
     tangent = np.where(settled[:, None], given.tangent, state.axes[..., 0])
-    updates = [frame_update(*touch) for touch in zip(state.axes, mean, tangent, strict=True)]
+    updates = map(frame_update, state.axes, mean, tangent)
     axes, k1, k2, angle = (np.array(values) for values in zip(*updates, strict=True))
     state = _State(axes, k1, k2, weights, hyper.prior, hyper.noise)
     if not settled.any():

@@ -18,7 +18,6 @@ from ..lapack import cholesky
 LENGTHS = np.array([0.4, 1.6])  # The lengths l_i, as shares of the radius (benchmarks.real).
 DISTANCES_AT_ONCE = 6000  # The number of distances that fit into a processor's cache.
 KERNEL_ROUNDING = 1e-9  # This share of its mean is added to the diagonal of k(u, u), so that it has a factor.
-PARTIALS = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
 
 
 def places_factor(within: Array) -> Array:
@@ -31,21 +30,15 @@ def kernel(p: Array, q: Array, variances: Array) -> Array:
     """Covariances of g at points (..., n, 2) and (..., m, 2), (..., n, m), for variances (2,)."""
     one, other = kernels(p, q)
     one *= variances[0]
-    other *= variances[1]
-    one += other
+    one += variances[1] * other
     return one
-
-
-def kernels(p: Array, q: Array) -> list[Array]:
-    """Kernels of unit variance, (..., n, m), for each of LENGTHS."""
-    return _maternes(distances(p, q))
 
 
 def weighted_kernel(p: Array, q: Array, variances: Array, weights: Array) -> Array:
     """k(p, q) @ weights at points (n, 2) and (m, 2), (n,)."""
     total, rows = np.empty(len(p)), max(1, DISTANCES_AT_ONCE // max(len(q), 1))
     for start in range(0, len(p), rows):
-        one, other = _maternes(distances(p[start : start + rows], q))
+        one, other = kernels(p[start : start + rows], q)
         total[start : start + rows] = one @ (variances[0] * weights) + other @ (variances[1] * weights)
     return total
 
@@ -59,11 +52,15 @@ def distances(p: Array, q: Array) -> Array:
     return np.sqrt(apart, out=apart)
 
 
-def _maternes(distance: Array) -> list[Array]:
-    """M of distances (...), which are used up, for each of LENGTHS; one follows from the other."""
+def kernels(p: Array, q: Array) -> list[Array]:
+    """Kernels of unit variance at points (..., n, 2) and (..., m, 2), (..., n, m), for each of LENGTHS.
+
+    One follows from the other.
+    """
     # This works in place, because passes over memory take most of the time.
     short, long = LENGTHS.tolist()
-    a = np.multiply(distance, math.sqrt(3.0) / long, out=distance)
+    a = distances(p, q)
+    a *= math.sqrt(3.0) / long
     decay, ratio = np.exp(-a), long / short
     other = ratio * a
     other += 1.0
@@ -74,18 +71,10 @@ def _maternes(distance: Array) -> list[Array]:
     return [other, a]
 
 
-def derived_kernel(p: Array, places: Array, variances: Array, weights: Array) -> Array:
-    """k(p, places) @ weights at points (n, 2) and its derivatives by p, (6, n), in the order of PARTIALS."""
-    total = np.zeros((len(PARTIALS), len(p)))
-    for variance, length in zip(variances, LENGTHS, strict=True):
-        total += variance * (_derived_matern(p[:, None] - places, length) @ weights)
-    return total
-
-
-def kernel_slopes(p: Array, places: Array, variances: Array) -> Array:
-    """Derivatives of k(p, places) by p at points (n, 2), (2, n, m)."""
+def derived_kernel(p: Array, places: Array, variances: Array) -> Array:
+    """k(p, places) of points (n, 2) and (m, 2), and its derivatives by p: (6, n, m), ordered as PARTIALS."""
     each = zip(variances, LENGTHS, strict=True)
-    return sum(v * _derived_matern(p[:, None] - places, length)[1:3] for v, length in each)
+    return sum(v * _derived_matern(p[:, None] - places, length) for v, length in each)
 
 
 def _derived_matern(apart: Array, length: float) -> Array:
@@ -95,5 +84,4 @@ def _derived_matern(apart: Array, length: float) -> Array:
     slope = -b * np.exp(-a)
     height = (1.0 + a) * np.exp(-a)
     bend = -b * slope / np.maximum(a, 1e-300)  # It is multiplied by less than a^2.
-    second = slope + bend * x**2, bend * x * y, slope + bend * y**2
-    return np.array([height, slope * x, slope * y, *second])
+    return np.array([height, slope * x, slope * y, slope + bend * x**2, bend * x * y, slope + bend * y**2])

@@ -19,9 +19,9 @@ import numpy as np
 
 from ..arguments import Array
 from ..contours.contour import Contour
-from ..contours.curves import distances_from_point, stacked
+from ..contours.curves import distances_from_point, has_measured_normals, stacked
 from ..contours.local_geometry import Frame
-from ..patch.monge import TERMS, derived_monomials
+from ..patch.monge import PARTIALS, TERMS, derived_monomials
 from .posterior import SurfacePosterior
 from .prior import FREE
 
@@ -46,7 +46,7 @@ def slope_equations(
     mx, my, mz = np.moveaxis(m / np.maximum(certainty, 1e-300)[..., None], -1, 0)
     # mz is 1 / |(z_x, z_y, 1)|.
     scale = np.sqrt(weights) * mz * np.minimum(certainty, 1.0 / SLOPE_MISFIT)
-    dx, dy = term_slopes(contacts) if partials is None else partials
+    dx, dy = derived_monomials(contacts, TERMS, PARTIALS[1:3]) if partials is None else partials
     # a and b are e_x and e_y turned by the least turn that takes e_z to m.
     axx, axy, ayy = 1.0 - mx**2 / (1.0 + mz), -mx * my / (1.0 + mz), 1.0 - my**2 / (1.0 + mz)
     rows = (axx[..., None] * dx + axy[..., None] * dy, axy[..., None] * dx + ayy[..., None] * dy)
@@ -54,21 +54,15 @@ def slope_equations(
     return slopes, np.concatenate([-scale * mx, -scale * my], axis=1)
 
 
-def term_slopes(contacts: Array) -> Array:
-    """Derivatives of the terms by x and y at contacts (..., 3), (2, ..., 27)."""
-    x, y, _ = contacts.reshape(-1, 3).T
-    found = derived_monomials(x, y, TERMS, [(1, 0), (0, 1)]).swapaxes(1, 2)
-    return found.reshape(2, *contacts.shape[:-1], -1)
-
-
 def measured_normals(contours: Sequence[Contour], frame: Frame, radius: float) -> tuple[Array, Array]:
     """Contacts with measured normals, except the reference point, in the frame and in unit radius, (n, 3).
 
     Also these normals, divided by their standard deviations, (n, 3).
     """
-    points, present, normals = stacked(frame.origin[None], [contours])
-    if normals is None:
+    if not has_measured_normals(contours):
         return np.empty((0, 3)), np.empty((0, 3))
+    points, present, normals = stacked(frame.origin[None], [contours])
+    assert normals is not None
     chosen = present & distances_from_point(points)[1] & normals.any(axis=-1)
     return points[chosen] @ frame.axes / radius, normals[chosen] @ frame.axes
 
@@ -84,7 +78,7 @@ def contradiction(contacts: Array, normals: Array, posterior: SurfacePosterior) 
     if 2 * len(normals) <= FREE:
         return 0.0, 0.0
     weights = np.ones((1, len(normals)))
-    slopes, steepness = (part[0] for part in slope_equations(normals[None], contacts[None], weights))
+    (slopes,), (steepness,) = slope_equations(normals[None], contacts[None], weights)
     covariance = slopes @ posterior.covariance @ slopes.T + np.eye(len(slopes))
     whitened = np.linalg.solve(
         np.linalg.cholesky(covariance),

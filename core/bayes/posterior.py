@@ -21,9 +21,18 @@ from numpy.typing import ArrayLike, NDArray
 from ..arguments import Array
 from ..lapack import solved
 from ..patch.differential_geometry import Derivatives
-from ..patch.monge import DEGREE, TERMS, HeightField, MongePatch, exponents, monomials, polynomial_derivatives
+from ..patch.monge import (
+    DEGREE,
+    PARTIALS,
+    QUARTIC,
+    TERMS,
+    HeightField,
+    MongePatch,
+    monomials,
+    polynomial_derivatives,
+)
 from . import kernel as process
-from .kernel import PARTIALS, derived_kernel, kernel, kernels, places_factor, weighted_kernel
+from .kernel import derived_kernel, kernel, kernels, places_factor, weighted_kernel
 from .prior import FREE, ORDERS
 
 WINDING = 1j * (TERMS[:, 0] - TERMS[:, 1])  # A turn by t adds (i - j) t to the phase of z^i z'^j, z = x + iy.
@@ -96,9 +105,7 @@ class SurfacePosterior(HeightField):
 
     def residuals(self, contacts: Array) -> Array:
         """The heights (b, n) of contacts (b, n, 3) above b polynomials."""
-        basis = monomials(contacts[..., 0].ravel(), contacts[..., 1].ravel(), TERMS)
-        basis = basis.reshape(*contacts.shape[:2], -1)
-        return contacts[..., 2] - (basis @ self.mean[..., None])[..., 0]
+        return contacts[..., 2] - (monomials(contacts, TERMS) @ self.mean[..., None])[..., 0]
 
     # What follows is for a single posterior, not for a stack.
 
@@ -111,15 +118,14 @@ class SurfacePosterior(HeightField):
         """The mean height at (x, y)."""
         z: Array = polynomial_derivatives(self.mean, TERMS, x, y, PARTIALS[:1])[0]
         if len(self.places):
-            p = _rows(x, y)
-            z += weighted_kernel(p, self.places, self.variances, self.alpha).reshape(z.shape)
+            z += weighted_kernel(_rows(x, y), self.places, self.variances, self.alpha).reshape(z.shape)
         return z
 
     def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
         """Height, slopes and second derivatives of the mean at (x, y)."""
         d = polynomial_derivatives(self.mean, TERMS, x, y, PARTIALS)
         if len(self.places):
-            d += derived_kernel(_rows(x, y), self.places, self.variances, self.alpha).reshape(d.shape)
+            d += (derived_kernel(_rows(x, y), self.places, self.variances) @ self.alpha).reshape(d.shape)
         return Derivatives(*d)
 
     def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
@@ -127,10 +133,6 @@ class SurfacePosterior(HeightField):
         known, left = self._whitened(_rows(x, y))
         variance = np.einsum("in,in->n", left, left) - np.einsum("in,in->n", known, known)
         return np.sqrt(np.maximum(self.variances.sum() + variance, 0.0))
-
-    def height_covariance(self, p: Array, q: Array) -> Array:
-        """Covariances of the heights at points (..., n, 2) and (..., m, 2), (..., n, m)."""
-        return self._covariance(p, self._signed(p), q, self._signed(q))
 
     def covariances_with(self, q: Array) -> Callable[[Array], tuple[Array, Array]]:
         """A function: covariances of heights at points (..., n, 2) with those at q (m, 2), and each other."""
@@ -155,19 +157,13 @@ class SurfacePosterior(HeightField):
 
     def _whitened(self, p: Array) -> tuple[Array, Array]:
         """L^-1 k(u, p), (m, n), and root @ f(p), (r, n), at points (n, 2)."""
-        terms = monomials(p[:, 0], p[:, 1], TERMS).T
         within = kernel(self.places, p, self.variances) if len(self.places) else np.empty((0, len(p)))
-        return self._whitened_sums(terms, np.ones(len(p)), within)
+        return self._whitened_sums(monomials(p, TERMS).T, np.ones(len(p)), within)
 
     def _whitened_sums(self, terms: Array, ones: Array, within: Array) -> tuple[Array, Array]:
         """What `_whitened` gives for terms (27, n), ones (n,) and k(u, p) (m, n), or for sums of such."""
-        left, size = self.root[:, : len(TERMS)] @ terms, len(TERMS) + 1
-        left += self.root[:, size - 1, None] * ones
-        if not len(within):
-            return within, left
-        known = solved(self._places_factor, within)
-        left += self.root[:, size:] @ known
-        return known, left
+        known = solved(self._places_factor, within) if len(within) else within
+        return known, self.root @ np.vstack([terms, ones, known])
 
     @cached_property
     def _places_factor(self) -> Array:
@@ -214,8 +210,7 @@ class SurfacePosterior(HeightField):
 
     def degree_shown(self, contacts: Array) -> int:
         """The least degree whose patch is off the mean by at most half its deviation at contacts (n, 3)."""
-        x, y, _ = contacts.T
-        basis = monomials(x, y, TERMS)
+        basis = monomials(contacts, TERMS)
         left = basis @ self.root[:, :-1].T
         variance = np.einsum("ni,ni->", left, left)
         off = basis[:, FREE:] @ (_departures() @ self.polynomial[FREE:]).T
@@ -295,26 +290,25 @@ def _complex_terms() -> tuple[Array, NDArray[np.complex128]]:
 
     The former is its real part above the negative of its imaginary part, (54, 27); the latter is (27, 27).
     """
-    x, y, _ = nodes()
-    z, (i, j) = (x + 1j * y)[:, None], TERMS.T
+    at, (i, j) = nodes()[0], TERMS.T
+    z = at[:, :1] + 1j * at[:, 1:]
     complex_terms: NDArray[np.complex128] = z**i * z.conj() ** j
-    to_complex = np.linalg.lstsq(complex_terms, monomials(x, y, TERMS).astype(complex), rcond=None)[0]
+    to_complex = np.linalg.lstsq(complex_terms, monomials(at, TERMS).astype(complex), rcond=None)[0]
     return np.vstack([to_complex.real, -to_complex.imag]), np.linalg.inv(to_complex)
 
 
 @cache
 def _truncation(degree: int) -> Array:
     """The matrix (m, 22) that fits terms up to `degree` to the 22 terms of degree 3 to 6 over the disk."""
-    x, y, weights = nodes()
-    basis = np.sqrt(weights)[:, None] * monomials(x, y, TERMS[FREE:])
+    at, weights = nodes()
+    basis = np.sqrt(weights)[:, None] * monomials(at, TERMS[FREE:])
     return np.linalg.lstsq(basis[:, : terms_to(degree) - FREE], basis, rcond=None)[0]
 
 
 @cache
 def _departures() -> Array:
     """What truncations of degree 2 to 5 leave of the terms of degree 3 to 6, (4, 22, 22)."""
-    size = terms_to(DEGREE) - FREE
-    departures = np.tile(np.eye(size), (DEGREE - LEAST_DEGREE, 1, 1))
+    departures = np.tile(np.eye(len(TERMS) - FREE), (DEGREE - LEAST_DEGREE, 1, 1))
     for k, departure in enumerate(departures):
         truncation = _truncation(LEAST_DEGREE + k)
         departure[: len(truncation)] -= truncation
@@ -325,7 +319,7 @@ def _departures() -> Array:
 def _bent() -> Array:
     """The second derivatives of x^2, xy and y^2 in 18 directions, (18, 3)."""
     azimuths = np.pi / 18.0 * np.arange(18)
-    return 2.0 * monomials(np.cos(azimuths), np.sin(azimuths), TERMS[2:FREE])
+    return 2.0 * monomials(np.column_stack([np.cos(azimuths), np.sin(azimuths)]), TERMS[2:FREE])
 
 
 @cache
@@ -337,21 +331,21 @@ def _normal_points() -> Array:
 
 
 @cache
-def nodes() -> tuple[Array, Array, Array]:
-    """x, y and weights (56,) that integrate products of two terms over the disk: Gauss nodes on circles.
+def nodes() -> tuple[Array, Array]:
+    """Gauss points (56, 2) and weights (56,), on circles, that integrate products of two terms over the disk.
 
     Thirteen azimuths suffice. An even number is the same for either way of d1.
     """
     at, weights = np.polynomial.legendre.leggauss(4)  # type: ignore[no-untyped-call]  # The nodes are in r^2.
     azimuths = 2.0 * np.pi * np.arange(14) / 14
     radii = DISK * np.sqrt((at + 1.0) / 2.0)
-    x, y = np.outer(radii, np.cos(azimuths)).ravel(), np.outer(radii, np.sin(azimuths)).ravel()
-    return x, y, np.repeat(weights, 14)
+    points = np.multiply.outer(radii, np.column_stack([np.cos(azimuths), np.sin(azimuths)]))
+    return points.reshape(-1, 2), np.repeat(weights, 14)
 
 
 def nearest_quartic(mean: Array, alpha: Array, places: Array, variances: Array) -> Array:
     """The terms of degree 1 and 2, (5,), of the quartic nearest to z over QUARTIC_SHARE of the radius."""
-    (at, weights), half = _projection(), len(nodes()[2])
+    (at, weights), half = _projection(), len(nodes()[1])
     found: Array = _projected_terms()[:FREE] @ mean
     return found + weights[:FREE, :half] @ weighted_kernel(at[:half], places, variances, alpha)
 
@@ -368,22 +362,22 @@ def _projection() -> tuple[Array, Array]:
     Terms up to degree 2 are those of the nearest quartic over the disk of QUARTIC_SHARE. The other terms are
     nearest to what these leave over DISK.
     """
-    x, y, shares = nodes()
-    whole, root = np.column_stack([x, y]), np.sqrt(shares)
+    whole, shares = nodes()
+    root, count = np.sqrt(shares), len(shares)
     near = QUARTIC_SHARE / DISK * whole
-    quartic = np.linalg.pinv(root[:, None] * monomials(near[:, 0], near[:, 1], exponents(0, 4)))[1:] * root
-    basis = monomials(x, y, TERMS)
+    quartic = np.linalg.pinv(root[:, None] * monomials(near, QUARTIC))[1:] * root
+    basis = monomials(whole, TERMS)
     rest = np.linalg.pinv(root[:, None] * basis[:, FREE:]) * root
-    first = np.hstack([quartic[:FREE], np.zeros((FREE, len(x)))])
-    left = np.hstack([np.zeros((len(x), len(x))), np.eye(len(x))]) - basis[:, :FREE] @ first
+    first = np.hstack([quartic[:FREE], np.zeros((FREE, count))])
+    left = np.eye(count, 2 * count, count) - basis[:, :FREE] @ first
     return np.vstack([near, whole]), np.vstack([first, rest @ left])
 
 
 @cache
 def _projected_terms() -> Array:
     """What the projection makes of each term, (27, 27)."""
-    (x, y), weights = _projection()[0].T, _projection()[1]
-    return weights @ monomials(x, y, TERMS)
+    at, weights = _projection()
+    return weights @ monomials(at, TERMS)
 
 
 @cache

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..lapack import cholesky, inverse_lower, solved, solved_definite
-from ..patch.monge import TERMS, monomials
+from ..patch.monge import PARTIALS, TERMS, derived_monomials, monomials
 from .evidence import Hyperparameters, process_hyperparameters
 from .joint_fit import MISFIT, Observations, frame_update
-from .kernel import kernel_slopes, kernels, places_factor
-from .normals import slope_equations, term_slopes
+from .kernel import derived_kernel, kernels, places_factor
+from .normals import slope_equations
 from .posterior import SurfacePosterior, nearest_quartic
 
 # Chosen with benchmarks.real.
@@ -62,8 +62,7 @@ class Touch(NamedTuple):
 def touch_of(contacts: Array, roots: Array, normals: Array, places: NDArray[np.intp]) -> Touch:
     """The equations of a touch."""
     flat = contacts[:, :2]
-    basis = monomials(flat[:, 0], flat[:, 1], TERMS)
-    return Touch(contacts, roots, normals, places, basis, kernels(flat, flat[places]))
+    return Touch(contacts, roots, normals, places, monomials(flat, TERMS), kernels(flat, flat[places]))
 
 
 def process_fit(
@@ -97,8 +96,7 @@ def process_fit(
         if not (use_gp or (given.noise_is_known[i] and _is_texture(off[i, there], float(given.noise[i])))):
             continue
         if rms[i] <= MISFIT:  # The polynomial averages facets, so its frame is kept.
-            of_process = process_posterior(touch, hyper, posterior.visibility[i])
-            found[i] = replace(of_process, sextic=found[i])
+            found[i] = replace(process_posterior(touch, hyper, posterior.visibility[i]), sextic=found[i])
             continue
         quartic = nearest_quartic(
             *_mean_given(touch, hyper, *carried), touch.contacts[places, :2], hyper.process
@@ -167,9 +165,10 @@ def _slopes(touch: Touch, factor: Array, places: Array, variances: Array) -> tup
 
     They are derivative observations (Rasmussen and Williams 2006, 9.4) of the surface that the places carry.
     """
-    of_process = kernel_slopes(touch.contacts[:, :2], places, variances)
+    of_process = derived_kernel(touch.contacts[:, :2], places, variances)[1:3]
     carried = solved(factor, of_process.reshape(-1, len(places)).T).T.reshape(of_process.shape)
-    partials = np.concatenate([term_slopes(touch.contacts), carried], axis=2)[:, None]
+    of_terms = derived_monomials(touch.contacts, TERMS, PARTIALS[1:3])
+    partials = np.concatenate([of_terms, carried], axis=2)[:, None]
     (slopes,), (steepness,) = slope_equations(
         touch.normals[None], touch.contacts[None], touch.roots[None] ** 2, partials
     )

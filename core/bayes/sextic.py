@@ -27,7 +27,7 @@ class Sextics(NamedTuple):
     rows : (b, 28, n), the 27 terms and the heights
     weights : (b, n)
     heights, slopes : (b, 28, 28), normal equations [[gram, rhs], [rhs', y'y]] of contacts, and of measured
-        normals in units of their deviations; the latter are None without normals
+        normals in units of their deviations; the latter are 0 without normals
     pivot : (b, 27), mean of the terms over the contacts, for surfaces that need not pass through the origin:
         the rows are then less their means; 0 for surfaces that do
     """
@@ -35,7 +35,7 @@ class Sextics(NamedTuple):
     rows: Array
     weights: Array
     heights: Array
-    slopes: Array | None
+    slopes: Array
     pivot: Array
 
     @property
@@ -49,15 +49,13 @@ class Sextics(NamedTuple):
 
     def equations(self, noise: Array) -> Array:
         """What contacts and normals add to the precision and to its product with the mean, (b, 28, 28)."""
-        found: Array = self.heights / (noise**2)[:, None, None]
-        return found if self.slopes is None else found + self.slopes
+        return self.heights / (noise**2)[:, None, None] + self.slopes
 
     def hyperparameters(
         self, floor: Array, which: slice | NDArray[np.bool_] = slice(None)
     ) -> Hyperparameters:
         """Waviness and noise of some of the touches, of which the latter is at least `floor` (b,)."""
-        slopes = None if self.slopes is None else self.slopes[which]
-        return hyperparameters(self.heights[which], self.counts[which], slopes, floor[which])
+        return hyperparameters(self.heights[which], self.counts[which], self.slopes[which], floor[which])
 
 
 def sextics(local: Array, weights: Array, expected: Array, normals: Array, through: bool = True) -> Sextics:
@@ -67,20 +65,21 @@ def sextics(local: Array, weights: Array, expected: Array, normals: Array, throu
     through : whether the surfaces pass through the origin
     """
     b, n = weights.shape
-    rows, pivot, slopes = np.empty((b, len(TERMS) + 1, n)), np.zeros((b, len(TERMS))), None
-    terms = monomials(local[..., 0].ravel(), local[..., 1].ravel(), TERMS)
-    rows[:, :-1] = terms.T.reshape(-1, b, n).transpose(1, 0, 2)
+    rows, pivot = np.empty((b, len(TERMS) + 1, n)), np.zeros((b, len(TERMS)))
+    rows[:, :-1] = monomials(local, TERMS).swapaxes(1, 2)
     np.subtract(local[..., 2], (expected[:, None] @ rows[:, :-1])[:, 0], out=rows[:, -1])
     if not through:
         means = np.einsum("bin,bn->bi", rows, weights / weights.sum(axis=1)[:, None])
         rows -= means[..., None]
         pivot = means[:, :-1]
-    if normals.shape[1]:
+    heights = (rows * weights[:, None]) @ rows.transpose(0, 2, 1)
+    slopes = np.zeros_like(heights)
+    if normals.size:
         partials, steepness = slope_equations(normals, local, weights)
-        steepness = steepness - (partials @ expected[..., None])[..., 0]
-        columns = np.concatenate([partials, steepness[..., None]], axis=2)
+        steepness = steepness[..., None] - partials @ expected[..., None]
+        columns = np.concatenate([partials, steepness], axis=2)
         slopes = columns.transpose(0, 2, 1) @ columns
-    return Sextics(rows, weights, (rows * weights[:, None]) @ rows.transpose(0, 2, 1), slopes, pivot)
+    return Sextics(rows, weights, heights, slopes, pivot)
 
 
 def mean_given(data: Sextics, hyper: Hyperparameters) -> Array:
@@ -95,12 +94,10 @@ def with_scatter(data: Sextics, coefficients: Array, normals: Array) -> Sextics:
 
     Normals (b, n, 3) of a texture scatter about the polynomial by more than their own deviation.
     """
-    assert data.slopes is not None
     off = np.concatenate([coefficients, np.full((len(coefficients), 1), -1.0)], axis=1)
-    squares = np.einsum("bi,bij,bj->b", off, data.slopes, off)
     freedom = 2.0 * np.count_nonzero(normals.any(axis=2) & (data.weights > 0.0), axis=1) - FREE
-    spread = np.maximum(squares / np.maximum(freedom, 1.0), 1.0)
-    return data._replace(slopes=data.slopes / spread[:, None, None])
+    spread = np.einsum("bi,bij,bj->b", off, data.slopes, off) / np.maximum(freedom, 1.0)
+    return data._replace(slopes=data.slopes / np.maximum(spread, 1.0)[:, None, None])
 
 
 def posterior_given(mean: Array, data: Sextics, hyper: Hyperparameters) -> SurfacePosterior:

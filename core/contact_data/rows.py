@@ -111,14 +111,13 @@ class RowReader:
         numbers, labels = np.vstack(self._numbers), np.concatenate(self._labels)
         if not len(numbers):
             raise ValueError(f"{self._name}: expected contacts below the header, got none")
-        normals = numbers[:, 3:6] if "nx" in self._columns else None
         return contours(
             self._name,
             labels,
-            numbers[:, :3],
-            normals,
-            numbers[:, -1] if "time" in self._columns else None,
-            self.labels,
+            points=numbers[:, :3],
+            normals=numbers[:, 3:6] if "nx" in self._columns else None,
+            times=numbers[:, -1] if "time" in self._columns else None,
+            titles=self.labels,
         )
 
     def _parse_block(self, block: str) -> tuple[list[str], Array]:
@@ -159,6 +158,7 @@ class RowReader:
         return labels, np.array(numbers).reshape(-1, len(self._keys))
 
     def _parse_row(self, at: str, fields: list[str]) -> tuple[str, list[float]]:
+        """The label and the k numbers of a row at the place `at`, with NaN for normals that it has not."""
         if any(fields[self._width :]):
             raise ValueError(
                 f"{at}: expected {self._width} fields, got {len(fields)}: decimal commas need semicolons or "
@@ -168,15 +168,14 @@ class RowReader:
         label = row.get("curve", "1")
         if not label:
             raise ValueError(f'{at}: expected a number or a name in the column "curve", got none')
-        values = [self._value(at, row, key) for key in POINT_COLUMNS]
         measured = "nx" in row and any(row[key] for key in NORMAL_COLUMNS)
         if measured is not self._measured.setdefault(label, measured):
             raise ValueError(f"{at}: expected normals at all contacts of a curve or at none, got some")
-        if "nx" in row:
-            values += [self._value(at, row, key) if measured else math.nan for key in NORMAL_COLUMNS]
-        return label, [*values, *([self._value(at, row, "time")] if "time" in row else [])]
+        blank = () if measured else NORMAL_COLUMNS
+        return label, [math.nan if key in blank else self._value(at, row, key) for key in self._keys]
 
     def _value(self, at: str, row: Mapping[str, str], key: str) -> float:
+        """The number in the column `key` of a row. Raises ValueError that names place and column."""
         return number_of(f'{at}, column "{key}"', row[key], LARGEST if key in POINT_COLUMNS else math.inf)
 
 

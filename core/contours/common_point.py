@@ -4,7 +4,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -52,7 +51,7 @@ def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
             )
     origin = found[0].points[0]  # Far from the world's origin only differences of points are exact.
     contours = [Contour(contour.points - origin) for contour in found]
-    refined = [_refined(start, contours) for start in _starts(contours)]
+    refined = (_refined(start, contours) for start in _starts(contours))
     point, tangents, misses = min(refined, key=lambda fit: float(np.sum(fit[2] ** 2)))
     _require_near(point, misses, contours)
     _require_crossing(tangents)
@@ -69,8 +68,7 @@ def in_running_order(contour: Contour, point: ArrayLike) -> Contour:
         return contour
     tangent = curves_through(r[None, None], np.ones((1, 1, len(r)), dtype=bool)).tangents[0, 0]
     order = np.argsort(np.copysign(np.linalg.norm(r, axis=1), r @ tangent), kind="stable")
-    normals = None if contour.normals is None else contour.normals[order]
-    return replace(contour, points=contour.points[order], normals=normals)
+    return contour.part(order, contour.stops)
 
 
 def _starts(contours: Sequence[Contour]) -> Array:
@@ -85,10 +83,8 @@ def _starts(contours: Sequence[Contour]) -> Array:
     thinned = [contour.points[:: -(-len(contour.points) // MOST_SEARCHED)] for contour in contours]
     contacts = np.vstack(thinned)
     contacts = contacts[:: -(-len(contacts) * len(thinned) // MAX_QUERIES)]
-    squares = np.zeros(len(contacts))
-    for points in thinned:
-        squares += cKDTree(points).query(contacts)[0] ** 2
-    apart, starts = MAX_OFFSET * min(map(_size, contours)), np.empty((0, 3))
+    squares = np.sum([cKDTree(points).query(contacts)[0] ** 2 for points in thinned], axis=0)
+    apart, starts = MAX_OFFSET * min(contour.size for contour in contours), np.empty((0, 3))
     left = squares <= 4.0 * squares.min() + len(contours) * apart**2
     while len(starts) < MOST_STARTS and left.any():
         best = contacts[np.argmin(np.where(left, squares, np.inf))]
@@ -97,13 +93,9 @@ def _starts(contours: Sequence[Contour]) -> Array:
     return starts
 
 
-def _size(contour: Contour) -> float:
-    return float(np.linalg.norm(np.ptp(contour.points, axis=0)))
-
-
 def _refined(point: Array, contours: Sequence[Contour]) -> tuple[Array, Array, Array]:
     """Runs Gauss-Newton: the point (3,), the curves' unit tangents there (c, 3) and their offsets (c,)."""
-    reach = min(map(_size, contours))
+    reach = min(contour.size for contour in contours)
     for _ in range(NEWTON_STEPS):
         near = [Contour(_near(point, contour.points)) for contour in contours]
         local = local_curves(curves_through(*stacked(point[None], [near])))[0][0]
@@ -132,9 +124,9 @@ def _near(point: Array, points: Array) -> Array:
 
 
 def _require_near(point: Array, misses: Array, contours: Sequence[Contour]) -> None:
+    """Raises DegenerateCurvesError if a curve misses the point (3,), by `misses` (c,), or has a gap there."""
     for number, (contour, offset) in enumerate(zip(contours, misses, strict=True), 1):
-        size = _size(contour)
-        gap = float(np.linalg.norm(contour.points - point, axis=1).min())
+        size, gap = contour.size, contour.distance_to(point)
         if not (offset <= MAX_OFFSET * size and gap <= MAX_GAP * size):
             raise DegenerateCurvesError(
                 f"the curves do not come near each other: curve {number}, {size:.3g} long, is "
@@ -144,6 +136,7 @@ def _require_near(point: Array, misses: Array, contours: Sequence[Contour]) -> N
 
 
 def _require_crossing(tangents: Array) -> None:
+    """Raises DegenerateCurvesError if all unit tangents (c, 3) are the same line."""
     sines = np.linalg.norm(np.cross(tangents[:, None], tangents[None]), axis=2)
     if sines.max() < math.sin(LEAST_ANGLE):
         raise DegenerateCurvesError(

@@ -3,9 +3,8 @@
 """Sampling planes and the contours in them (paper, section II), and vectors as Python floats."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -100,25 +99,23 @@ class Contour:
 
     def __post_init__(self) -> None:
         points = finite_array("points", self.points, (None, 3), LARGEST)
-        single = getattr(self.points, "dtype", None) == np.float32
-        if single and len(points):
+        if getattr(self.points, "dtype", None) == np.float32 and len(points):
             spacing = float(np.spacing(np.abs(points).max().astype(np.float32)))
             if spacing > CURVE_ROUNDING * np.ptp(points, axis=0).max() > 0.0:
                 raise ValueError(
                     f"points: numbers of single precision are {spacing:g} apart here, too coarse for a curve "
                     "of this size: expected coordinates relative to a nearby point, or double precision"
                 )
-        checks: dict[str, Callable[[Any], Any]] = {
-            "plane_normal": partial(unit_vector, "plane_normal"),
-            "normals": lambda normals: finite_array("normals", normals, (len(points), 3)),
-            "noise": partial(number, "noise", least=0.0),
-            "stops": lambda stops: tuple(list_of("stops", stops, str)),
-            "normal_std": partial(number, "normal_std", least=0.0),
-            "ball": partial(number, "ball", above=0.0),
-        }
-        given = {name: value for name, value in vars(self).items() if value is not None}
-        checked = {name: check(given[name]) for name, check in checks.items() if name in given}
-        vars(self).update(checked, points=points)
+        up, normals, std = self.plane_normal, self.normals, self.normal_std
+        vars(self).update(  # __setattr__ of a frozen dataclass raises.
+            points=points,
+            plane_normal=None if up is None else unit_vector("plane_normal", up),
+            normals=None if normals is None else finite_array("normals", normals, (len(points), 3)),
+            noise=None if self.noise is None else number("noise", self.noise, least=0.0),
+            stops=None if self.stops is None else tuple(list_of("stops", self.stops, str)),
+            normal_std=None if std is None else number("normal_std", std, least=0.0),
+            ball=None if self.ball is None else number("ball", self.ball, above=0.0),
+        )
         if self.stops is not None and len(self.stops) != 2:
             raise ValueError(f"stops: expected two words, got {shown(self.stops)}")
         if self.normal_std is not None:
@@ -139,8 +136,17 @@ class Contour:
             sums = np.add.reduceat(consistently_oriented(self.normals, order, starts)[order], starts, axis=0)
             vars(self)["normals"] = sums[firsts]
 
-    def part(self, which: slice, stops: tuple[str, str]) -> "Contour":
-        """The contour of some of its contacts, which are known to be valid."""
+    @property
+    def size(self) -> float:
+        """The diagonal of the box around its points, a length."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+    def distance_to(self, point: Array) -> float:
+        """The distance of its nearest contact from a point (3,), or infinity if it has no contacts."""
+        return float(np.linalg.norm(self.points - point, axis=1).min(initial=np.inf))
+
+    def part(self, which: slice | NDArray[Any], stops: tuple[str, str] | None) -> "Contour":
+        """The contour of some of its contacts, or of all in another order, which are known to be valid."""
         found = object.__new__(Contour)
         normals = None if self.normals is None else self.normals[which]
         vars(found).update(vars(self), points=self.points[which], normals=normals, stops=stops)

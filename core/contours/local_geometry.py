@@ -70,8 +70,8 @@ def principal_curvatures(
     return mean - half, mean + half, np.where(umbilic, 0.0, 0.5 * np.arctan2(-b, -a))
 
 
-def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array, Array]:
-    """Darboux frames (b, 3, 3) about normals (b, 3); kappa1 and kappa2 in unit radius and the radii L, (b,).
+def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array]:
+    """Darboux frames (b, 3, 3) about normals (b, 3); kappa1 and kappa2 (b, 2) in unit radius; radii L (b,).
 
     d1 is within 90 degrees of the first curve's tangent, and is this tangent at an umbilic. L is the largest
     distance of a contact from the point in the tangent plane.
@@ -79,11 +79,9 @@ def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array, Array
     tangents = curves.tangents
     e1 = tangents[:, 0] - np.einsum("bi,bi->b", tangents[:, 0], n)[:, None] * n
     e1 /= np.sqrt(np.einsum("bi,bi->b", e1, e1))[:, None]
-    plane = np.empty((len(n), 3, 2))
-    plane[..., 0], plane[..., 1] = e1, np.array(cross(n.T, e1.T)).T
+    plane = np.array([e1.T, cross(n.T, e1.T)]).transpose(2, 1, 0)
     flat = curves.points @ plane[:, None]
-    squares = np.einsum("...i,...i->...", flat, flat) * curves.present
-    radius = np.sqrt(squares.reshape(len(n), -1).max(axis=1))
+    radius = np.sqrt((np.einsum("...i,...i->...", flat, flat) * curves.present).max(axis=(1, 2)))
     # By Meusnier the normal curvature is the normal part of the curvature vector, with its sign: the paper's
     # kappa' cos(theta).
     kappas = radius[:, None] * np.einsum("bci,bi->bc", curves.curvatures, n)
@@ -91,9 +89,8 @@ def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array, Array
     angles = np.arctan2(flat[..., 1], flat[..., 0])
     k1, k2, theta = principal_curvatures(angles, kappas, curves.present.any(axis=2))
     c, s = np.cos(theta), np.sin(theta)
-    axes = np.empty((len(n), 3, 3))
-    axes[..., :2], axes[..., 2] = plane @ np.array([[c, -s], [s, c]]).transpose(2, 0, 1), n
-    return axes, k1, k2, radius
+    directions = plane @ np.array([[c, -s], [s, c]]).transpose(2, 0, 1)
+    return np.concatenate([directions, n[..., None]], axis=2), np.array([k1, k2]).T, radius
 
 
 def degeneracy(

@@ -65,8 +65,7 @@ def _signed_positions(r: Array, count: int) -> Array:
     """
     # It takes the tangent of `count` contacts near the point, because a steep curve's longest axis is its
     # normal.
-    order = np.argsort(np.einsum("ni,ni->n", r, r), kind="stable")
-    near = r[order[:count]]
+    near = r[np.argsort(np.einsum("ni,ni->n", r, r), kind="stable")[:count]]
     along = r @ np.linalg.eigh(near.T @ near)[1][:, -1]
     along *= np.copysign(1.0, (np.arange(len(along)) - (len(along) - 1) / 2.0) @ along)
     return along

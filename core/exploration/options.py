@@ -60,17 +60,16 @@ class ExplorationOptions:
         generator_of(self.rng)
         _ = self.fit
         extent = _length("extent", self.extent)
-        checked = {
-            "planes": planes_of(self.planes),
-            "extent": extent,
-            "step": _length("step", self.step),
-            "farthest": extent or _length("farthest", self.farthest),
-            "largest_std": _length("largest_std", self.largest_std),
-            "tolerance": None if self.tolerance is None else number("tolerance", self.tolerance, least=0.0),
-            "most_planes": number("most_planes", self.most_planes, least=3.0),
-            "noise": number("noise", self.noise, least=0.0),
-        }
-        vars(self).update(checked)  # __setattr__ of a frozen dataclass raises.
+        vars(self).update(  # __setattr__ of a frozen dataclass raises.
+            planes=planes_of(self.planes),
+            extent=extent,
+            step=_length("step", self.step),
+            farthest=extent or _length("farthest", self.farthest),
+            largest_std=_length("largest_std", self.largest_std),
+            tolerance=None if self.tolerance is None else number("tolerance", self.tolerance, least=0.0),
+            most_planes=number("most_planes", self.most_planes, least=3.0),
+            noise=number("noise", self.noise, least=0.0),
+        )
 
     @property
     def fit(self) -> FitOptions:

@@ -36,8 +36,7 @@ def suffices(r: Reconstruction) -> bool:
     nodes, m = points / r.radius, len(places)
     shared, covariance = r.posterior.covariances_with(nodes)(places)
     # A patch by another method departs from the posterior's mean, and more contacts do not lower that.
-    own = r.node_stds / r.radius if r.method == "bayes" else r.posterior.height_std(*nodes.T)
-    variance = own**2
+    variance = (r.node_stds / r.radius if r.method == "bayes" else r.posterior.height_std(*nodes.T)) ** 2
     covariance.flat[:: m + 1] += r.posterior.noise**2 * m / len(contacts)
     whitened = solved(cholesky(covariance), shared)  # Rasmussen and Williams 2006, algorithm 2.1
     lost = r.widening(r.domain.node_places) ** 2 * np.einsum("in,in->n", whitened, whitened)

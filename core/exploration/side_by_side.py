@@ -51,13 +51,17 @@ def exploring_many(
 
     def steps(point: Array, direction: Array) -> Steps:
         """The steps of one touch."""
-        reference = SamplingPlane(0.0).axes(direction, tangent)
         place = surface, point, direction
-        farthest = options.farthest or _farthest(partial(track, *place, options.planes, tangent=tangent))
-        follow = partial(
-            tracker, *place, noise=options.noise, rng=generator, tangent=tangent, least_cosine=cosine
+        touch = Touch(
+            partial(
+                tracker, *place, noise=options.noise, rng=generator, tangent=tangent, least_cosine=cosine
+            ),
+            point,
+            reference=SamplingPlane(0.0).axes(direction, tangent),
+            farthest=options.farthest or _farthest(partial(track, *place, options.planes, tangent=tangent)),
+            tap=partial(tapped, surface),
+            options=options,
         )
-        touch = Touch(follow, point, reference, farthest, partial(tapped, surface), options)
         return (yield from touch.steps())
 
     return _side_by_side([steps(*place) for place in zip(p, up, strict=True)], p, up, options.fit)

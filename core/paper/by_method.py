@@ -46,12 +46,9 @@ def coefficients(
 def _half_curves(curves: Curves) -> list[Array]:
     """The contacts (n_i, 3) of each half curve, from the point outward; half curves are sorted by azimuth."""
     halves = []
-    each = zip(curves.points, curves.present, curves.along, curves.tangents, strict=True)
-    for points, present, along, tangent in each:
-        for half, sign in (
-            (points[present & (along < 0.0)][::-1], -1.0),
-            (points[present & (along > 0.0)], 1.0),
-        ):
-            if len(half):
-                halves.append((np.arctan2(sign * tangent[1], sign * tangent[0]), half))
-    return [half for _, half in sorted(halves, key=lambda half: half[0])]
+    for points, present, along, (x, y, _) in zip(
+        curves.points, curves.present, curves.along, curves.tangents, strict=True
+    ):
+        halves.append((np.arctan2(-y, -x), points[present & (along < 0.0)][::-1]))
+        halves.append((np.arctan2(y, x), points[present & (along > 0.0)]))
+    return [half for _, half in sorted(halves, key=lambda half: half[0]) if len(half)]

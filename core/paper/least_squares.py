@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arguments import Array
 from ..patch.domain import GRID, Domain
-from ..patch.monge import MongePatch, derived_monomials, exponents, monomials
+from ..patch.monge import PARTIALS, MongePatch, derived_monomials, exponents, monomials
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ def problem(k1: float, k2: float, degree: int, points: Array) -> Problem:
     """The problem (5) for the terms of degree 3 to `degree` at local contacts (n, 3)."""
     quadric = MongePatch(k1, k2, np.empty(0))
     x, y, z = points.T
-    return Problem(quadric, degree, monomials(x, y, exponents(3, degree)), z - quadric.height(x, y))
+    return Problem(quadric, degree, monomials(points, exponents(3, degree)), z - quadric.height(x, y))
 
 
 def condition_number(basis: Array) -> float:
@@ -46,7 +46,7 @@ def least_squares(data: Problem) -> Array:
 
 def quadratic_variation(data: Problem, domain: Domain, weight: float) -> Array:
     """The minimum of the integral of z_xx^2 + 2 z_xy^2 + z_yy^2 plus lambda f(a) (V), a linear solve."""
-    bends, quadric_bends, h = on_grid(data, domain, [(2, 0), (1, 1), (0, 2)])
+    bends, quadric_bends, h = on_grid(data, domain, PARTIALS[3:])
     factors = h * np.sqrt([1.0, 2.0, 1.0])
     share = np.sqrt(weight / len(data.basis))
     rows = [share * data.basis, *(f * bend.T for f, bend in zip(factors, bends, strict=True))]
@@ -57,7 +57,7 @@ def quadratic_variation(data: Problem, domain: Domain, weight: float) -> Array:
 def on_grid(data: Problem, domain: Domain, orders: list[tuple[int, int]]) -> tuple[Array, Array, float]:
     """k derivatives of the terms, (k, terms, m), and the quadric, (k, m), on the m points of (8); and h."""
     points, h = domain.grid(GRID)
-    terms = derived_monomials(points[:, 0], points[:, 1], exponents(2, data.degree), orders)
+    terms = derived_monomials(points, exponents(2, data.degree), orders).swapaxes(1, 2)
     quadric_bends = 0.5 * (data.quadric.k1 * terms[:, 0] + data.quadric.k2 * terms[:, 2])
     return terms[:, 3:], quadric_bends, h
 

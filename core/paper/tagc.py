@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arguments import Array
 from ..patch.domain import Domain
+from ..patch.monge import PARTIALS
 from .least_squares import Problem, on_grid
 
 # |D| is rounded by these shares of its mean at the start, one after the other. With the last one the minimum
@@ -41,8 +42,7 @@ class Objective:
     """
 
     def __init__(self, data: Problem, domain: Domain, weight: float) -> None:
-        orders = [(1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
-        basis, self._quadric_bends, h = on_grid(data, domain, orders)
+        basis, self._quadric_bends, h = on_grid(data, domain, PARTIALS[1:])
         self._basis, self._area, self._data = basis, h**2, data
         self._flat = np.concatenate(list(basis), axis=1)  # (terms, 5 m)
         self._scale = weight / len(data.basis)

@@ -44,11 +44,6 @@ class Domain:
         """The domain with every length multiplied by `factor`."""
         return Domain(factor * self.ends, self.open_ends)
 
-    @property
-    def _straight(self) -> NDArray[np.bool_] | None:
-        """A mask (m,) of the pieces of the boundary, from one end to the next, that are straight, or None."""
-        return None if self.open_ends is None else self.open_ends | np.roll(self.open_ends, -1)
-
     @cached_property
     def _spline(self) -> tuple[Array, Array]:
         """The chord lengths h (m,), and the closed C2 cubic spline over them by powers, (4, m, 2).
@@ -68,20 +63,16 @@ class Domain:
         system[rows, rows] = 2.0 * (lengths + before)
         system[rows, last], system[rows, following] = lengths, before
         right = 3.0 * (over * rise[last] + before[:, None] * rise)
-        straight = self._straight
-        if straight is not None:
-            adjacent = straight | straight[last]
-            system[adjacent], right[adjacent] = (
-                np.eye(len(rows))[adjacent],
-                self.ends[adjacent] @ QUARTER_TURN,
-            )
-            right[adjacent] /= np.linalg.norm(self.ends[adjacent], axis=1, keepdims=True)
+        is_open = np.zeros(len(rows), dtype=bool) if self.open_ends is None else self.open_ends
+        straight = is_open | is_open[following]  # pieces, each from its end to the next
+        adjacent = straight | straight[last]
+        system[adjacent] = np.eye(len(rows))[adjacent]
+        right[adjacent] = self.ends[adjacent] @ QUARTER_TURN
+        right[adjacent] /= np.linalg.norm(self.ends[adjacent], axis=1, keepdims=True)
         slopes = np.linalg.solve(system, right)
         bend = (slopes + slopes[following] - 2.0 * rise) / over
         pieces = np.array([self.ends, slopes, (rise - slopes) / over - bend, bend / over])
-        if straight is not None:
-            pieces[1, straight] = rise[straight]
-            pieces[2:, straight] = 0.0
+        pieces[1, straight], pieces[2:, straight] = rise[straight], 0.0
         return lengths, pieces
 
     @cached_property

@@ -12,7 +12,6 @@ from ..contours.local_geometry import Frame
 from .differential_geometry import Derivatives
 from .domain import GRID, Domain
 from .monge import HeightField
-from .triangulation import patch_mesh
 
 SIMILARITY_TOLERANCE = 1e-4  # A similarity in single precision may be off by so much.
 
@@ -35,23 +34,13 @@ class Geometry(HeightField):
     def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
         """Height, slopes and second derivatives at local (x, y)."""
         d = self.surface.derivatives(np.divide(x, self.radius), np.divide(y, self.radius))
-        bends = (values / self.radius for values in (d.xx, d.xy, d.yy))
-        return Derivatives(self.radius * d.z, d.x, d.y, *bends)
+        return Derivatives(
+            self.radius * d.z, d.x, d.y, d.xx / self.radius, d.xy / self.radius, d.yy / self.radius
+        )
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The height z at local (x, y)."""
         return self.radius * self.surface.height(np.divide(x, self.radius), np.divide(y, self.radius))
-
-    def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
-        """Whether each local (x, y) lies in the domain or on its boundary; in the shape of x and y."""
-        return self.domain.contains(x, y)
-
-    def mesh(self, tolerance: float) -> tuple[Array, NDArray[np.intp]]:
-        """The patch as points (n, 3), in the frame, and counterclockwise triangles (m, 3).
-
-        It is off the surface by no more than the tolerance.
-        """
-        return patch_mesh(self, self.domain, tolerance)
 
     def moved(self, matrix: ArrayLike) -> "Geometry":
         """This geometry after a similarity (4, 4) of the world; raises what `similarity` raises."""
@@ -107,4 +96,4 @@ def overlapped(geometry: Geometry, vertices: ArrayLike, normals: ArrayLike) -> N
     local, radius = geometry.frame.to_local(vertices), geometry.radius
     near = np.flatnonzero((np.abs(local) <= 2.0 * radius).all(axis=1) & (np.abs(local[:, 2]) <= radius))
     facing = near[np.asarray(normals, dtype=float)[near] @ geometry.frame.axes[:, 2] > 0.0]
-    return facing[geometry.contains(local[facing, 0], local[facing, 1])]
+    return facing[geometry.domain.contains(local[facing, 0], local[facing, 1])]

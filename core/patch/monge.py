@@ -26,32 +26,28 @@ def exponents(lowest: int, highest: int) -> NDArray[np.intp]:
 DEGREE = 6  # The default fit sees all terms up to this degree at once.
 TERMS = exponents(1, DEGREE)
 QUADRIC, QUARTIC = exponents(0, 2), exponents(0, 4)
+PARTIALS = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]  # The orders (dx, dy) of Derivatives.
 
 
-def monomials(x: Array, y: Array, terms: NDArray[np.intp]) -> Array:
-    """The values (n, m) of the terms (m, 2) at n points."""
-    if terms is exponents(1, 6):  # This is the most frequent case, done degree by degree.
-        return _monomials_to(x, y, 6).T
-    return derived_monomials(x, y, terms, [(0, 0)])[0].T
-
-
-def _monomials_to(x: Array, y: Array, degree: int) -> Array:
-    """The values (m, n) of the terms of `exponents(1, degree)` at n points, each degree from the last one."""
-    values = np.empty((degree * (degree + 3) // 2, len(x)))
+def monomials(points: Array, terms: NDArray[np.intp]) -> Array:
+    """The values (..., m) of the terms (m, 2) at points (..., 2), or (..., 3), whose z does not count."""
+    if terms is not TERMS:
+        return derived_monomials(points, terms, PARTIALS[:1])[0]
+    # This is the most frequent case, done degree by degree.
+    x, y = points[..., 0].ravel(), points[..., 1].ravel()
+    values = np.empty((len(TERMS), len(x)))
     values[0], values[1], start = x, y, 0
-    for d in range(2, degree + 1):
+    for d in range(2, DEGREE + 1):
         end = start + d
         np.multiply(values[start:end], x, out=values[end : end + d])
         np.multiply(values[end - 1], y, out=values[end + d])
         start = end
-    return values
+    return values.T.reshape(*points.shape[:-1], len(terms))
 
 
-def derived_monomials(
-    x: Array, y: Array, terms: NDArray[np.intp], orders: Sequence[tuple[int, int]]
-) -> Array:
-    """The values (k, m, n) of k derivatives (dx, dy) of the terms (m, 2) at n points."""
-    i, j = terms.T
+def derived_monomials(points: Array, terms: NDArray[np.intp], orders: Sequence[tuple[int, int]]) -> Array:
+    """The values (k, ..., m) of k derivatives (dx, dy) of the terms (m, 2) at points (..., 2) or (..., 3)."""
+    (i, j), (x, y) = terms.T, points.reshape(-1, points.shape[-1]).T[:2]
     powers = np.ones((int(terms.max(initial=0)) + 1, 2, len(x)))
     powers[1:] = x, y
     x_powers, y_powers = np.cumprod(powers, axis=0).swapaxes(0, 1)
@@ -62,7 +58,7 @@ def derived_monomials(
         for exponent, times in ((i, dx), (j, dy)):
             for k in range(times):
                 values *= (exponent - k)[:, None]
-    return derived
+    return derived.swapaxes(1, 2).reshape(len(orders), *points.shape[:-1], len(terms))
 
 
 class HeightField:
@@ -153,11 +149,11 @@ class MongePatch(HeightField):
 
     def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
         """Height, slopes and second derivatives at (x, y)."""
-        return Derivatives(*self._evaluate(x, y, [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]))
+        return Derivatives(*self._evaluate(x, y, PARTIALS))
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """z(x, y)."""
-        return self._evaluate(x, y, [(0, 0)])[0]
+        return self._evaluate(x, y, PARTIALS[:1])[0]
 
     def _evaluate(self, x: ArrayLike, y: ArrayLike, orders: list[tuple[int, int]]) -> Array:
         """The derivatives (m, ...) of m orders (dx, dy)."""

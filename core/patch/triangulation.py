@@ -112,9 +112,9 @@ def _lattice(domain: Domain, size: Size, rim: Array, finest: float) -> Array:
     wide[i == 0] *= 2.0  # No trapezoid may lie across the axis, because its diagonal would lean.
     distance = cKDTree(rim).query(points)[0]
     wanted = np.minimum(size(points), edge + EDGE_GROWTH * distance)
-    kept = np.flatnonzero((wanted < 1.999 * wide) & (distance > CLEAR * edge))
+    kept = (wanted < 1.999 * wide) & (distance > CLEAR * edge)
     outward = np.argsort((i**2 + 3 * j**2)[kept], kind="stable")  # Whole numbers are the same in any unit.
-    return points[kept[outward]]
+    return points[kept][outward]
 
 
 def _delaunay(points: Array, inner: int) -> NDArray[np.intp]:

@@ -39,8 +39,8 @@ def center_at(point: Array, contours: Sequence[Contour], ball: float) -> Array:
     It is a contact if no center is nearer than half the ball's radius. Raises DegenerateCurvesError if
     contours do not meet then.
     """
-    away = [float(np.linalg.norm(contour.points - point, axis=1).min(initial=np.inf)) for contour in contours]
-    return point if min(away, default=0.0) < 0.5 * ball else common_point(contours)[0]
+    away = min((contour.distance_to(point) for contour in contours), default=0.0)
+    return point if away < 0.5 * ball else common_point(contours)[0]
 
 
 def contacts_below(
@@ -51,38 +51,28 @@ def contacts_below(
     Strokes beyond its domain are left out. Raises DegenerateCurvesError where the ball is too large for the
     surface.
     """
-    _require_resolved(centers, ball)
-    for contour in contours:
-        _require_reached(centers, contour)
-    point = centers.frame.origin - ball * centers.frame.axes[:, 2]
-    inside = []
-    for stroke in strokes:
-        x, y, _ = centers.frame.to_local(stroke.points).T
-        which = np.flatnonzero(centers.domain.contains(x, y))
-        normals = None if stroke.normals is None else stroke.normals[which]
-        inside.append(replace(stroke, points=stroke.points[which], normals=normals))
-    below = [[_below(centers, given, ball) for given in some] for some in (contours, inside)]
-    return point, below[0], below[1]
-
-
-def _below(centers: Reconstruction, given: Contour, ball: float) -> Contour:
-    """Contacts below centers."""
-    x, y, _ = centers.frame.to_local(given.points).T
-    d = centers.geometry.derivatives(x, y)
-    normals = np.column_stack([-d.x, -d.y, np.ones(len(x))])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    points = given.points - ball * normals @ centers.frame.axes.T
-    return replace(given, points=points, plane_normal=None, ball=None)
-
-
-def _require_resolved(centers: Reconstruction, ball: float) -> None:
-    """Raises DegenerateCurvesError if the centers bend as about an edge."""
+    # The centers bend as about an edge.
     if centers.patch.k1 - centers.k1_std < -1.0 / ball:
         raise DegenerateCurvesError(
             f"the centers bend by {-centers.patch.k1:.3g} +- {centers.k1_std:.1g}, as those of a ball of "
             f"radius {ball:g} do on an edge, which may be sharper than the ball resolves: use a smaller ball "
             "or another point"
         )
+    for contour in contours:
+        _require_reached(centers, contour)
+    inside = (
+        stroke.part(centers.domain.contains(*centers.frame.to_local(stroke.points).T[:2]), stroke.stops)
+        for stroke in strokes
+    )
+    below = [[_below(centers, given, ball) for given in some] for some in (contours, inside)]
+    return centers.frame.origin - ball * centers.normal, below[0], below[1]
+
+
+def _below(centers: Reconstruction, given: Contour, ball: float) -> Contour:
+    """Contacts below centers."""
+    normals = centers.geometry.normal(*centers.frame.to_local(given.points).T[:2])
+    points = given.points - ball * normals @ centers.frame.axes.T
+    return replace(given, points=points, plane_normal=None, ball=None)
 
 
 def _require_reached(centers: Reconstruction, contour: Contour) -> None:

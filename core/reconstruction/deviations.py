@@ -9,27 +9,24 @@ import numpy as np
 
 from ..arguments import Array
 from ..bayes.posterior import coefficients_of
-from ..patch.monge import TERMS, derived_monomials, monomials
+from ..patch.monge import PARTIALS, TERMS, derived_monomials, monomials
 from .result import Reconstruction
 
 # Surfaces have terms beyond a sextic's, which count more and more outward: at a radius from the middle the
 # deviation of K is larger by the exponential of this (python -m benchmarks.atlas).
 OUTWARD_STD = 1.3
-SLOPES_AND_BENDS = (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)  # Curvatures follow from these derivatives.
 
 
 def mean_height_stds(results: Sequence[Reconstruction]) -> list[float]:
     """The mean_height_std of each, computed together, which is several times as fast as one by one."""
-    plain = [r for r in results if not r.posterior.amplitude]
-    of_sextics = iter(_mean_stds_of_sextics(plain))
+    of_sextics = iter(_mean_stds_of_sextics([r for r in results if not r.posterior.amplitude]))
     return [r.radius * next(of_sextics) if not r.posterior.amplitude else r.mean_height_std for r in results]
 
 
 def with_height_stds(results: Sequence[Reconstruction]) -> list[Reconstruction]:
     """Reconstructions with `known_height_std`, computed for all at once; status and message need it first."""
-    stds = mean_height_stds(results)
     # For those with a process the mean has been computed from `node_stds`, which they keep.
-    pairs = zip(results, stds, strict=True)
+    pairs = zip(results, mean_height_stds(results), strict=True)
     return [replace(r, known_height_std=std) if not r.posterior.amplitude else r for r, std in pairs]
 
 
@@ -48,8 +45,7 @@ def _mean_stds_of_sextics(results: Sequence[Reconstruction]) -> list[float]:
         for r in results
     ]).reshape(-1, len(TERMS), 1)  # fmt: skip
     root = np.array([r.posterior.root for r in results]).reshape(-1, *2 * [len(TERMS) + 1])
-    x, y = points.reshape(-1, 2).T
-    basis = monomials(x, y, TERMS).reshape(len(results), most, len(TERMS))
+    basis = monomials(points, TERMS)
     left = basis @ root[..., :-1].swapaxes(1, 2) + root[:, None, :, -1]
     variance = np.einsum("bni,bni->bn", left, left) + (basis @ off)[..., 0] ** 2
     means: Array = np.einsum("bn,bn->b", weights, np.sqrt(variance))
@@ -62,7 +58,7 @@ def gaussian_curvature_stds(r: Reconstruction, x: Array, y: Array) -> Array:
     They follow from the gradient of K in the coefficients and, since that does not suffice at a rim, from
     the second-order variance of z_xx z_yy - z_xy^2 for normally distributed second derivatives.
     """
-    by = np.swapaxes(derived_monomials(x / r.radius, y / r.radius, TERMS, SLOPES_AND_BENDS), 1, 2)
+    by = derived_monomials(np.stack([x, y], axis=-1) / r.radius, TERMS, PARTIALS[1:])
     derivatives, covariance = by @ r.posterior.polynomial, r.posterior.covariance
     zx, zy, zxx, zxy, zyy = derivatives[:, :, None]
     steep = 1.0 + zx**2 + zy**2

@@ -122,8 +122,8 @@ def fitted(
     # Measured normals of some cost time in the fits of all, and touches without contours start differently.
     kinds = [(has_measured_normals(touch.contours), touch.strokes_only) for touch in touches]
     for kind in dict.fromkeys(kinds):
-        order = [i for i in range(len(touches)) if kinds[i] == kind]
-        order.sort(key=sizes.__getitem__, reverse=True)
+        of_kind = (i for i in range(len(touches)) if kinds[i] == kind)
+        order = sorted(of_kind, key=sizes.__getitem__, reverse=True)
         while order:
             count = max(1, STACK // max(sizes[order[0]], 1))
             chosen, order = order[:count], order[count:]
@@ -142,9 +142,8 @@ def _touch(
     touch, ball = _given(contours, strokes, options), ball_of(contours, strokes)
     if not ball:
         return p, touch
-    by_default = replace(options, method="bayes", degree="auto")
     center = center_at(p, contours, ball)
-    centers = _fitted_one(center, touch, up, by_default)
+    centers = _fitted_one(center, touch, up, replace(options, method="bayes", degree="auto"))
     balls = [stroke for stroke in strokes if isinstance(stroke, Contour)]
     below, contours, balls = contacts_below(centers, contours, balls, ball)
     return below if center is p else p, _given(contours, balls, options)
@@ -159,6 +158,7 @@ def _fitted_one(p: Array, touch: Given, up: Array, options: FitOptions) -> Recon
 
 
 def _given(contours: list[Contour], strokes: Sequence[ArrayLike | Contour], options: FitOptions) -> Given:
+    """The contacts of a touch. Raises ValueError for strokes or a radius that do not go with the options."""
     found = Given(contours, *gathered(strokes, contours))
     if len(found.strokes) and options.method != "bayes":
         raise ValueError(

@@ -55,8 +55,8 @@ def suggest_plane(
     direction = SamplingPlane(azimuth).axes(n, d1)[:, 0]
     if outward is not None:
         azimuth = azimuth_of(direction, outward, tangent)
-    plane = SamplingPlane(azimuth, direction=vector_of(direction))
-    return plane, r.radius * float(weights @ np.sqrt(variance))
+    expected = r.radius * float(weights @ np.sqrt(variance))
+    return SamplingPlane(azimuth, direction=vector_of(direction)), expected
 
 
 def _variance_reduction(

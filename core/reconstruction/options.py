@@ -41,10 +41,9 @@ class FitOptions:
         degree, weight = self.degree, self.weight
         if not isinstance(degree, int | np.integer | str) or degree not in ("auto", 2, 3, 4, 5, 6):
             raise ValueError(f'degree: expected a whole number from 2 to 6 or "auto", got {shown(degree)}')
-        checked = {
-            "degree": degree if isinstance(degree, str) else int(degree),
-            "noise": None if self.noise is None else number("noise", self.noise, least=0.0),
-            "weight": None if weight is None else number("weight", weight, above=0.0),
-            "radius": None if self.radius is None else number("radius", self.radius, above=0.0),
-        }
-        vars(self).update(checked)  # __setattr__ of a frozen dataclass raises.
+        vars(self).update(  # __setattr__ of a frozen dataclass raises.
+            degree=degree if isinstance(degree, str) else int(degree),
+            noise=None if self.noise is None else number("noise", self.noise, least=0.0),
+            weight=None if weight is None else number("weight", weight, above=0.0),
+            radius=None if self.radius is None else number("radius", self.radius, above=0.0),
+        )

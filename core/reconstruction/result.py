@@ -20,7 +20,6 @@ from ..contours.curves import (
     Curves,
     curves_through,
     distances_from_point,
-    has_measured_normals,
     misses,
     stacked,
 )
@@ -29,6 +28,7 @@ from ..paper import least_squares
 from ..patch.domain import Domain
 from ..patch.geometry import Geometry, similarity, total_absolute_curvature
 from ..patch.monge import MongePatch, exponents, monomials
+from ..patch.triangulation import patch_mesh
 from .status import Taps, contradicted, doubt, notes
 
 NEAR_POINT = 0.6  # This share of a process's deviation is left at the point (benchmarks.real).
@@ -67,8 +67,8 @@ class Reconstruction:
     known_curves: Curves | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "contours", tuple(contour.copied() for contour in self.contours))
-        object.__setattr__(self, "strokes", read_only(self.strokes))
+        copies = tuple(contour.copied() for contour in self.contours)
+        vars(self).update(contours=copies, strokes=read_only(self.strokes))
 
     def __repr__(self) -> str:
         point = ", ".join(f"{x:.4g}" for x in self.frame.origin)
@@ -100,9 +100,9 @@ class Reconstruction:
     @cached_property
     def contacts(self) -> Array:
         """The fitted contacts besides the reference point, (n, 3), in the frame."""
-        curves = [contour.points - self.frame.origin for contour in self.contours]
-        strokes = self.strokes - self.frame.origin
-        return np.vstack([*(r[distances_from_point(r)[1]] for r in curves), strokes]) @ self.frame.axes
+        curves = (contour.points - self.frame.origin for contour in self.contours)
+        off_point = [r[distances_from_point(r)[1]] for r in curves]
+        return np.vstack([*off_point, self.strokes - self.frame.origin]) @ self.frame.axes
 
     @cached_property
     def misses(self) -> Array:
@@ -113,8 +113,12 @@ class Reconstruction:
     @cached_property
     def posterior(self) -> SurfacePosterior:
         """What the contacts show and leave open, in the frame and in units of L."""
-        if isinstance(self.geometry.surface, SurfacePosterior):
-            return self.geometry.surface
+        surface = self.geometry.surface
+        return surface if isinstance(surface, SurfacePosterior) else self._posterior_of_contacts
+
+    @cached_property
+    def _posterior_of_contacts(self) -> SurfacePosterior:
+        """What contacts show without measured normals or a process, in the frame and in units of L."""
         k1, k2 = self.patch.k1 * self.radius, self.patch.k2 * self.radius
         return posterior_of(k1, k2, self.contacts / self.radius, self.noise)
 
@@ -128,14 +132,15 @@ class Reconstruction:
 
     def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Standard deviation of the height at local (x, y), in their shape, with what contacts leave open."""
-        points = np.column_stack([np.ravel(v) for v in np.broadcast_arrays(x, y)])
-        outward = np.ones(len(points))
-        if self.posterior.amplitude:  # Otherwise it makes no difference.
-            outward = np.linalg.norm(self.domain.places(points), axis=1)
-        std = self._height_std(points, self.widening(outward))
-        return std.reshape(np.broadcast_shapes(np.shape(x), np.shape(y)))
+        points = np.stack(np.broadcast_arrays(x, y), axis=-1)
+        flat = points.reshape(-1, 2)
+        # Without a process nothing is widened, wherever in the domain a place is.
+        places = self.domain.places(flat) if self.posterior.amplitude else flat
+        widening = self.widening(np.linalg.norm(places, axis=1))
+        return self._height_std(flat, widening).reshape(points.shape[:-1])
 
     def _height_std(self, points: Array, widening: Array) -> Array:
+        """`height_std` (n,) at local points (n, 2), given `widening` (n,) there."""
         u, v = points.T / self.radius
         std = widening * self.posterior.height_std(u, v)
         if self.method != "bayes":  # A patch by another method departs from the posterior's mean, too.
@@ -170,16 +175,14 @@ class Reconstruction:
         """
         x, y, _ = self.frame.to_local(finite_array("points", points, (None, 3), LARGEST)).T
         d, std = self.geometry.derivatives(x, y), self.height_std(x, y)
-        local = np.column_stack([-d.x, -d.y, np.ones(len(x))])
-        normals = local @ self.frame.axes.T / np.linalg.norm(local, axis=1, keepdims=True)
-        return self.frame.to_world(np.column_stack([x, y, d.z])), normals, std
+        return self.frame.to_world(np.column_stack([x, y, d.z])), d.normal @ self.frame.axes.T, std
 
     def mesh(self) -> tuple[Array, NDArray[np.intp]]:
         """The patch as points (n, 3), in the frame, and counterclockwise triangles (m, 3).
 
         It is as fine as the patch is certain: off the patch by at most 0.6 times mean_height_std.
         """
-        return self.geometry.mesh(MESH_SHARE * self.mean_height_std)
+        return patch_mesh(self.geometry, self.domain, MESH_SHARE * self.mean_height_std)
 
     @property
     def k1(self) -> float:
@@ -217,8 +220,7 @@ class Reconstruction:
         """Standard deviation of K at the point, in 1/length^2, for normally distributed k1 and k2."""
         c = 4.0 * self.posterior.covariance[2:FREE:2, 2:FREE:2]
         k = self.radius * np.array([self.patch.k2, self.patch.k1])
-        variance = k @ c @ k + c[0, 0] * c[1, 1] + c[0, 1] ** 2
-        return math.sqrt(variance) / self.radius**2
+        return math.sqrt(k @ c @ k + c[0, 0] * c[1, 1] + c[0, 1] ** 2) / self.radius**2
 
     @cached_property
     def null_space_dimension(self) -> int:
@@ -254,9 +256,8 @@ class Reconstruction:
         """
         if not self.posterior.amplitude:
             return 0.0
-        x, y = self.contacts[:, :2].T
-        basis = monomials(x / self.radius, y / self.radius, exponents(1, 4))
-        height = self.height(x, y)
+        basis = monomials(self.contacts / self.radius, exponents(1, 4))
+        height = self.height(*self.contacts[:, :2].T)
         off = height - basis @ np.linalg.lstsq(basis, height, rcond=None)[0]
         return math.sqrt(float(np.mean(off**2)))
 
@@ -268,8 +269,8 @@ class Reconstruction:
     @cached_property
     def condition_number(self) -> float:
         """Condition number of the least-squares system of the coefficients, in unit radius."""
-        x, y, _ = self.contacts.T / self.radius
-        return least_squares.condition_number(monomials(x, y, exponents(3, self.patch.degree)))
+        terms = exponents(3, self.patch.degree)
+        return least_squares.condition_number(monomials(self.contacts / self.radius, terms))
 
     def moved(self, matrix: ArrayLike) -> "Reconstruction":
         """This reconstruction after a similarity (4, 4) of the world: rotation, scale above 0 and shift.
@@ -301,6 +302,7 @@ class Reconstruction:
 
     @cached_property
     def _verdict(self) -> tuple[str, str]:
+        """The status and its sentence, without notes."""
         return contradicted(self) or doubt(self) or ("ok", "The patch describes its contacts.")
 
     @cached_property
@@ -308,17 +310,15 @@ class Reconstruction:
         """The number of deviations, and the share of L, by which a curve is off what the others show."""
         if self.method != "bayes":
             return 0.0, 0.0
-        counted = [distances_from_point(contour.points - self.frame.origin)[1] for contour in self.contours]
-        curve = np.repeat(np.arange(len(counted)), list(map(np.count_nonzero, counted)))
-        curve = np.append(curve, np.full(len(self.strokes), -1))
+        off_point = (distances_from_point(contour.points - self.frame.origin)[1] for contour in self.contours)
+        sizes = [int(np.count_nonzero(counted)) for counted in off_point]
+        curve = np.repeat([*range(len(sizes)), -1], [*sizes, len(self.strokes)])
         return contradicting_curve(self.contacts / self.radius, curve, self.posterior, self.noise)
 
     @cached_property
     def _fitted_normals(self) -> tuple[Array, Array]:
         """Contacts with fitted normals and these normals, (n, 3) each, as `measured_normals` has them."""
-        if self.method != "bayes" or not has_measured_normals(self.contours):
-            return np.empty((0, 3)), np.empty((0, 3))
-        return measured_normals(self.contours, self.frame, self.radius)
+        return measured_normals(self.contours if self.method == "bayes" else (), self.frame, self.radius)
 
     @cached_property
     def contradiction(self) -> tuple[float, float]:
@@ -326,9 +326,7 @@ class Reconstruction:
         contacts, normals = self._fitted_normals
         if not len(normals):
             return 0.0, 0.0
-        k1, k2 = self.patch.k1 * self.radius, self.patch.k2 * self.radius
-        of_contacts = posterior_of(k1, k2, self.contacts / self.radius, self.noise)
-        return contradiction(contacts, normals, of_contacts)
+        return contradiction(contacts, normals, self._posterior_of_contacts)
 
     @cached_property
     def normal_scatter(self) -> tuple[float, float]:

@@ -79,14 +79,13 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
             f"version: expected {VERSION}, got {shown(d['version'])}: this was written by another release"
         )
     method, strokes, patch = _of(d, "method"), _of(d, "strokes"), _polynomial(_of(d, "patch"))
-    contours = _contours(_of(d, "contours"), strokes is not None)
     if not isinstance(method, str) or method not in METHODS:
         raise ValueError(f"method: expected one of {', '.join(METHODS)}, got {shown(method)}")
     surface = _posterior(_of(d, "posterior")) if method == "bayes" else None
     r = Reconstruction(
         geometry=_geometry(_of(d, "geometry"), surface or patch),
         patch=patch,
-        contours=contours,
+        contours=_contours(_of(d, "contours"), may_be_none=strokes is not None),
         noise=number("noise", _of(d, "noise"), least=0.0),
         method=method,
         converged=_converged(_of(d, "converged")),
@@ -100,6 +99,7 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
 
 
 def _of(d: Any, key: str) -> Any:
+    """The value of a key. Raises ValueError if `d` is no dict or has none."""
     if not isinstance(d, Mapping):
         raise ValueError(f"{key}: expected it in a dict, got {shown(d)}")
     if key not in d:
@@ -108,12 +108,14 @@ def _of(d: Any, key: str) -> Any:
 
 
 def _converged(value: Any) -> bool:
+    """The value, if it is True or False. Raises ValueError for anything else."""
     if not isinstance(value, bool):
         raise ValueError(f"converged: expected True or False, as to_dict gives it, got {shown(value)}")
     return value
 
 
 def _geometry(d: Any, surface: SurfacePosterior | MongePatch) -> Geometry:
+    """The geometry with this surface: a posterior in unit radius, or a patch in the caller's unit."""
     frame, radius = _of(d, "frame"), number("radius", _of(d, "radius"), least=SMALLEST)
     axes = finite_array("axes", _of(frame, "axes"), (3, 3))
     if np.abs(axes.T @ axes - np.eye(3)).max() > ORTHONORMAL or np.linalg.det(axes) < 0.0:
@@ -131,6 +133,7 @@ def _geometry(d: Any, surface: SurfacePosterior | MongePatch) -> Geometry:
 
 
 def _polynomial(d: Any) -> MongePatch:
+    """The polynomial (1) that `polynomial_dict` wrote."""
     coefficients = finite_array("coefficients", _of(d, "coefficients"), (None,))
     if len(coefficients) not in COEFFICIENTS:
         raise ValueError(
@@ -140,10 +143,10 @@ def _polynomial(d: Any) -> MongePatch:
 
 
 def _contours(contours: Any, may_be_none: bool) -> tuple[Contour, ...]:
+    """The contours of a list of dicts, which is empty only if there `may_be_none`."""
     if not isinstance(contours, Sequence) or not (contours or may_be_none):
         raise ValueError(f"contours: expected a list of some, got {shown(contours)}")
-    names = [field.name for field in fields(Contour)]
-    return tuple(Contour(**{name: _of(contour, name) for name in names}) for contour in contours)
+    return tuple(Contour(**{f.name: _of(contour, f.name) for f in fields(Contour)}) for contour in contours)
 
 
 def _taps(d: Any) -> Taps | None:
@@ -155,11 +158,13 @@ def _taps(d: Any) -> Taps | None:
 
 
 def _posterior_dict(posterior: SurfacePosterior) -> dict[str, Any]:
+    """A posterior as plain values, with its sextic if it has one."""
     values = {f.name: getattr(posterior, f.name) for f in fields(posterior)}
     return plain(values | {"sextic": posterior.sextic and _posterior_dict(posterior.sextic)})
 
 
 def _posterior(d: Any) -> SurfacePosterior:
+    """The posterior, in unit radius, that `_posterior_dict` wrote."""
     size, places = len(TERMS), finite_array("places", _of(d, "places") or np.empty((0, 2)), (None, 2))
     shapes: dict[str, tuple[int | None, ...]] = {
         "mean": (size,),

@@ -3,6 +3,7 @@
 """Touches that are fitted together, in stacks: the paper's sections III and IV, or the Bayesian fit."""
 
 from collections.abc import Sequence
+from itertools import count
 from typing import NamedTuple
 
 import numpy as np
@@ -42,17 +43,13 @@ def fitted_stack(
         start, contours, errors = strokes_start(points, touches, outward, options.noise, options.radius)
     else:
         start, contours, errors = curves_start(points, touches, outward, options.noise)
-    fit = None if start is None else _fit(start, options)
-    found: list[Reconstruction | DegenerateCurvesError] = []
-    each, i = zip(errors, contours, outward, strict=True), 0
-    for error, some, up in each:
-        if error is None:
-            assert start is not None and fit is not None
-            found.append(_result(start, fit, i, some, up, options))
-            i += 1
-        else:
-            found.append(error)
-    return found
+    if start is None:
+        return [error for error in errors if error is not None]
+    fit, row = _fit(start, options), count()
+    return [
+        error or _result(start, fit, next(row), some, up, options)
+        for error, some, up in zip(errors, contours, outward, strict=True)
+    ]
 
 
 def _fit(start: Start, options: FitOptions) -> _Fit:
@@ -149,11 +146,15 @@ def _result(
 
 
 def _curves(start: Start, fit: _Fit, i: int) -> Curves:
-    """The curves of touch i, in its frame and in unit radius."""
+    """The curves of touch i without normals, in its frame and in unit radius."""
     curves, axes, radius = start.curves.at(i), fit.axes[i], fit.radii[i]
-    local = fit.contacts[i, : curves.present.size].reshape(curves.points.shape)
-    along, curvatures = curves.along / radius, radius * (curves.curvatures @ axes)
-    return Curves(local, curves.present, along, curves.tangents @ axes, curvatures)
+    return curves._replace(
+        points=fit.contacts[i, : curves.present.size].reshape(curves.points.shape),
+        along=curves.along / radius,
+        tangents=curves.tangents @ axes,
+        curvatures=radius * (curves.curvatures @ axes),
+        normals=None,
+    )
 
 
 def _domain(curves: Curves, strokes: Array, contours: Sequence[Contour]) -> Domain | DegenerateCurvesError:

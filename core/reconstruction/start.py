@@ -4,7 +4,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -101,7 +100,7 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
     if not good:
         return None, touches, errors
     curves = curves.at(good)
-    axes, k1, k2, radii = darboux_frames(curves, normals[good])
+    axes, kappas, radii = darboux_frames(curves, normals[good])
     strokes = [
         _stroke_means(curves.at(row), touches[i], axes[row], radii[row], points[i], given[i])
         for row, i in enumerate(good)
@@ -118,9 +117,9 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
         not len(contacts) and (noise is not None or None not in [c.noise for c in touches[i]])
         for i, (contacts, _) in zip(good, strokes, strict=True)
     ]
-    kappas, noises = np.stack([k1, k2], axis=1), (np.array(stds), np.array(known))
-    first = Start(points[good], axes, kappas, radii, curves, [contacts for contacts, _ in strokes], *noises)
-    return first, touches, errors
+    contacts = [contacts for contacts, _ in strokes]
+    start = Start(points[good], axes, kappas, radii, curves, contacts, np.array(stds), np.array(known))
+    return start, touches, errors
 
 
 def _errors(
@@ -149,8 +148,8 @@ def away_from(point: Array, contours: Sequence[Contour]) -> DegenerateCurvesErro
         return None
     found = misses(curves_through(*stacked(point[None], [contours])))[0, :, 0]
     away = [
-        miss if min(gap, miss) > AWAY * size else 0.0
-        for miss, gap, size in zip(found, *_gaps_and_sizes(point, contours), strict=True)
+        miss if min(contour.distance_to(point), miss) > AWAY * contour.size else 0.0
+        for miss, contour in zip(found, contours, strict=True)
     ]
     worst = int(np.argmax(away))
     if not away[worst]:
@@ -161,11 +160,6 @@ def away_from(point: Array, contours: Sequence[Contour]) -> DegenerateCurvesErro
     )
 
 
-def _gaps_and_sizes(point: Array, contours: Sequence[Contour]) -> tuple[list[float], list[float]]:
-    gaps = [float(np.linalg.norm(contour.points - point, axis=1).min()) for contour in contours]
-    return gaps, [float(np.linalg.norm(np.ptp(contour.points, axis=0))) for contour in contours]
-
-
 def _std(noise: float | None, size: int, known: list[float]) -> float:
     """The least deviation of contacts, each a mean of `size` with this noise, or the largest known one."""
     return max(known) if noise is None else noise / math.sqrt(size)
@@ -174,27 +168,25 @@ def _std(noise: float | None, size: int, known: list[float]) -> float:
 def _stroke_means(
     curves: Curves, contours: Sequence[Contour], axes: Array, radius: float, point: Array, given: Given
 ) -> tuple[Array, int]:
-    """Strokes (n, 3) over the domain of curves as means, in unit radius; the least number in a mean."""
+    """Strokes (n, 3) over the domain of curves as means, in unit radius; the least number in a mean.
+
+    None are over curves that bound no domain.
+    """
     if not len(given.strokes):
         return given.strokes, 1
     local = (given.strokes - point) @ axes / radius
-    local_curves = replace(curves, points=curves.points @ axes / radius, tangents=curves.tangents @ axes)
-    over = _over(local_curves, contours, local)
+    local_curves = curves._replace(points=curves.points @ axes / radius, tangents=curves.tangents @ axes)
+    try:
+        domain = domain_of(local_curves, contours)
+    except ValueError:
+        return local[:0], 1
+    over = domain.contains(local[:, 0], local[:, 1]) & (np.abs(local[:, 2]) <= 1.0)
     return _means(local[over], given.when[over])
 
 
 def _means(contacts: Array, when: NDArray[np.intp]) -> tuple[Array, int]:
     """The means of contacts (n, 3) of strokes, and the least number in a mean; see `means`."""
     return means(contacts, toward_farthest(contacts[:, :2]), when) if len(contacts) else (contacts, 1)
-
-
-def _over(curves: Curves, contours: Sequence[Contour], strokes: Array) -> NDArray[np.bool_]:
-    """Which strokes (n, 3) are over the domain of curves, all in unit radius; none if there is no domain."""
-    try:
-        domain = domain_of(curves, contours)
-    except ValueError:
-        return np.zeros(len(strokes), dtype=bool)
-    return domain.contains(strokes[:, 0], strokes[:, 1]) & (np.abs(strokes[:, 2]) <= 1.0)
 
 
 def strokes_start(
@@ -216,15 +208,17 @@ def strokes_start(
         return None, none, errors
     good = list(firsts)
     thin = [_means(first.contacts, given[i].when[first.used]) for i, first in firsts.items()]
-    stds = [
-        _std(noise, size, [given[i].noise / math.sqrt(size)]) for i, (_, size) in zip(good, thin, strict=True)
-    ]
-    axes = np.array([first.axes for first in firsts.values()])
-    kappas = np.array([(first.k1, first.k2) for first in firsts.values()])
-    radii = np.array([first.radius for first in firsts.values()])
-    curves = curves_through(*stacked(points[good], [[]] * len(good)))
-    strokes, known = [contacts for contacts, _ in thin], np.zeros(len(good), dtype=bool)
-    start = Start(points[good], axes, kappas, radii, curves, strokes, np.array(stds), known)
+    sizes = zip(good, (size for _, size in thin), strict=True)
+    start = Start(
+        points=points[good],
+        axes=np.array([first.axes for first in firsts.values()]),
+        kappas=np.array([(first.k1, first.k2) for first in firsts.values()]),
+        radii=np.array([first.radius for first in firsts.values()]),
+        curves=curves_through(*stacked(points[good], [[]] * len(good))),
+        strokes=[contacts for contacts, _ in thin],
+        stds=np.array([_std(noise, size, [given[i].noise / math.sqrt(size)]) for i, size in sizes]),
+        stds_are_known=np.zeros(len(good), dtype=bool),
+    )
     return start, none, errors
 
 
@@ -241,12 +235,11 @@ def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
     open_ends = np.zeros_like(sides)
     for i, contour in enumerate(contours):
         open_ends[:, i] = [stop in SURFACE_ENDS for stop in contour.stops or ("", "")]
-    counted = sides
     if open_ends.any():
         at_point = open_ends & (np.linalg.norm(ends, axis=2) * sides < AT_POINT)
         ends[at_point] = (np.array([-AT_POINT, AT_POINT])[:, None, None] * ahead)[at_point]
-        counted = sides | at_point
-    return closed_spline_domain(ends[counted], 1.0, open_ends[counted])
+        sides |= at_point
+    return closed_spline_domain(ends[sides], 1.0, open_ends[sides])
 
 
 def too_coarse(gap: float, size: float) -> DegenerateCurvesError:

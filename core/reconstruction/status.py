@@ -62,7 +62,9 @@ def doubt(r: Judged) -> tuple[str, str] | None:
             "The contacts alone do not determine the surface between the curves (condition number "
             f"{r.condition_number:.1e}): use another method or add sampling planes."
         )
-    message = next(_doubts(r), None)
+    # The gravest come first.
+    each = (_about_point, _about_data, _about_heights, _about_frame, _about_curves)
+    message = next((sentence for about in each for sentence in about(r)), None)
     return None if message is None else ("uncertain", message)
 
 
@@ -92,12 +94,11 @@ def contradicted(r: Judged) -> tuple[str, str] | None:
 
 def _is_at_edge(r: Judged) -> bool:
     """Whether the surface ends at the point, as a half curve shows."""
-    for contour in r.contours:
-        reaches = np.linalg.norm(contour.points[[0, -1]] - r.frame.origin, axis=1) / r.radius
-        for reach, stop in zip(reaches, contour.stops or (), strict=False):
-            if reach <= AT_POINT and stop in SURFACE_ENDS:
-                return True
-    return False
+    return any(
+        stop in SURFACE_ENDS and np.linalg.norm(end - r.frame.origin) <= AT_POINT * r.radius
+        for contour in r.contours
+        for end, stop in zip(contour.points[[0, -1]], contour.stops or (), strict=False)
+    )
 
 
 def notes(r: Judged) -> str:
@@ -113,15 +114,6 @@ def notes(r: Judged) -> str:
     return message
 
 
-def _doubts(r: Judged) -> Iterator[str]:
-    """Every sentence of advice where there is doubt, the gravest first."""
-    yield from _about_point(r)
-    yield from _about_data(r)
-    yield from _about_heights(r)
-    yield from _about_frame(r)
-    yield from _about_curves(r)
-
-
 def _about_point(r: Judged) -> Iterator[str]:
     """Whether curves miss the point, which makes everything else doubtful, too."""
     distances, stds = r.misses.T / r.radius
@@ -129,8 +121,8 @@ def _about_point(r: Judged) -> Iterator[str]:
     apart = distances > np.maximum(DOUBTFUL_MISS, SIGNIFICANT * stds)
     if apart.any():
         worst = np.argmax(np.where(apart, distances, 0.0))
-        own = np.linalg.norm(r.contours[worst].points - r.frame.origin, axis=1).min()
-        if own <= OWN_POINT * r.radius:  # The point is one of its contacts, so the fit to these is off.
+        # If the point is one of its contacts, the fit to these is off.
+        if r.contours[worst].distance_to(r.frame.origin) <= OWN_POINT * r.radius:
             yield (
                 f"Curve {worst + 1} bends so sharply at the point that its fit is "
                 f"{100.0 * distances[worst]:.2g} % of the radius off there: move the point away from that "
@@ -144,6 +136,7 @@ def _about_point(r: Judged) -> Iterator[str]:
 
 
 def _about_data(r: Judged) -> Iterator[str]:
+    """Whether measured normals or half of the contacts are off what was found."""
     deviations, angle = r.contradiction
     if deviations > SIGNIFICANT and angle > CONTRADICTED:
         yield (
@@ -167,6 +160,7 @@ def _about_data(r: Judged) -> Iterator[str]:
 
 
 def _about_heights(r: Judged) -> Iterator[str]:
+    """Whether heights are uncertain."""
     share = r.mean_height_std / r.radius
     if share > DOUBTFUL_STD:
         yield (
@@ -176,6 +170,7 @@ def _about_heights(r: Judged) -> Iterator[str]:
 
 
 def _about_frame(r: Judged) -> Iterator[str]:
+    """Whether principal directions or curvatures are uncertain."""
     turn = r.posterior.turn(LIKELY if r.posterior.amplitude else CONFIDENCE)
     if turn > DOUBTFUL_TURN and not r.posterior.is_round:
         yield f"The principal directions may be {math.degrees(turn):.0f} degrees off: {_more_bend(r)}."
@@ -196,6 +191,7 @@ def _more_bend(r: Judged) -> str:
 
 
 def _about_curves(r: Judged) -> Iterator[str]:
+    """Whether a curve contradicts the others, or the surface waves along curves."""
     deviations, off = r.curve_contradiction
     if deviations > CONTRADICTING_CURVE:
         yield (

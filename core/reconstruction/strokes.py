@@ -106,13 +106,12 @@ def means(
     counts = np.diff(starts, append=n)[:, None]
     # What they leave open of the quartic is as small as it can be in axes that they choose.
     over, turn = contacts[order], np.array([[along[0], -along[1]], [along[1], along[0]]])
-    basis = _basis(over[:, :2] @ turn)
+    basis = monomials(over[:, :2] @ turn, QUARTIC)
     # Singular values of the contacts are roots of those of their normal equations.
-    inverse = np.linalg.pinv(basis.T @ basis, rcond=OPEN**2, hermitian=True)
-    quartic = inverse @ (basis.T @ over[:, 2])
+    quartic = np.linalg.pinv(basis.T @ basis, rcond=OPEN**2, hermitian=True) @ (basis.T @ over[:, 2])
     over[:, 2] -= basis @ quartic
     found: Array = np.add.reduceat(over, starts, axis=0) / counts
-    found[:, 2] += _basis(found[:, :2] @ turn) @ quartic
+    found[:, 2] += monomials(found[:, :2] @ turn, QUARTIC) @ quartic
     return found, int(counts.min())
 
 
@@ -142,10 +141,6 @@ def _equal(shares: Array, order: NDArray[np.intp], within: NDArray[np.intp], par
     found = np.empty(len(order), dtype=np.intp)
     found[order] = np.clip(parts * passed / totals[within[order]], 0, parts - 1)
     return found
-
-
-def _basis(flat: Array) -> Array:
-    return monomials(flat[:, 0], flat[:, 1], QUARTIC)
 
 
 def first_frame(r: Array, outward: Array, radius: float | None) -> FirstFrame | DegenerateCurvesError:
@@ -202,6 +197,7 @@ def _farthest(distances: Array) -> float:
 
 
 def _too_few(count: int) -> DegenerateCurvesError:
+    """The error for strokes with only this many contacts."""
     return DegenerateCurvesError(
         f"the strokes have {many(count, 'contact', 'contacts')} around the point, and {len(QUADRIC)} are "
         "needed: measure more, or use a larger radius"
@@ -218,10 +214,8 @@ def _plane(near: Array, outward: Array) -> Array:
 
 def _quadric(local: Array) -> Array | None:
     """Coefficients (6,) of the quadric nearest to contacts (n, 3) in unit radius; None if they carry none."""
-    basis = monomials(local[:, 0], local[:, 1], QUADRIC)
+    basis = monomials(local, QUADRIC)
     if len(basis) < len(QUADRIC):
         return None
-    u, singular, v = np.linalg.svd(basis, full_matrices=False)
-    if singular[-1] < DETERMINED * math.sqrt(len(basis)):
-        return None
-    return v.T @ ((u.T @ local[:, 2]) / singular)
+    found, _, _, singular = np.linalg.lstsq(basis, local[:, 2], rcond=None)
+    return None if singular[-1] < DETERMINED * math.sqrt(len(basis)) else found

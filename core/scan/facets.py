@@ -81,8 +81,8 @@ def is_beside_bend(
 
 def _follows_facets(r: Reconstruction, points: Array) -> bool:
     """Whether the paraboloid nearest to points (n, 3) of the world has other curvatures than the fit."""
-    x, y, z = r.frame.to_local(points).T / r.radius
-    b = np.linalg.lstsq(monomials(x, y, exponents(1, 2)), z, rcond=None)[0]
+    local = r.frame.to_local(points) / r.radius
+    b = np.linalg.lstsq(monomials(local, exponents(1, 2)), local[:, 2], rcond=None)[0]
     even = Derivatives(np.zeros(()), b[0], b[1], 2.0 * b[2], b[3], 2.0 * b[4]).principal_curvatures
     both = np.array([even, (r.radius * r.k1, r.radius * r.k2)])
     return bool(np.abs(np.ptp(both, axis=0)).max() > OTHER * np.abs(both).max())

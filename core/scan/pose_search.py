@@ -74,20 +74,22 @@ def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: 
     corners = corners_of(faces, len(co))
     oriented = np.array([r.contacts / r.radius, r.geometry.normal(*r.contacts[:, :2].T)])
     center = 0.5 * (co[corners].min(axis=(0, 1)) + co[corners].max(axis=(0, 1)))
-    size = math.dist(oriented[0].min(axis=0), oriented[0].max(axis=0))
-    mesh = mesh_of((co - center) / r.radius, corners, size)
+    mesh = mesh_of((co - center) / r.radius, corners, float(np.linalg.norm(np.ptp(oriented[0], axis=0))))
     starts = _initial_poses(oriented, mesh)
     places, residuals, slides = _registered(starts, oriented, mesh, NEAREST_TRIANGLES, FINE_STEPS)
     distinct = _distinct(places, residuals)
     poses = []
     for i in distinct[:best]:
         rotation, place = places[i, :, :3] @ r.frame.axes.T, center + r.radius * places[i, :, 3]
-        others = residuals[[j for j in distinct if j != i]]
-        alike = others < AMBIGUOUS * max(residuals[i], LEAST_RESIDUAL)
-        vertex = int(np.argmin(np.sum((co - place) ** 2, axis=1)))
-        shift = place - rotation @ r.frame.origin
-        residual = float(r.radius * residuals[i])
-        poses.append(Pose(rotation, shift, residual, vertex, bool(slides[i] or alike.any())))
+        good = residuals[distinct] < AMBIGUOUS * max(residuals[i], LEAST_RESIDUAL)
+        pose = Pose(
+            rotation,
+            translation=place - rotation @ r.frame.origin,
+            residual=float(r.radius * residuals[i]),
+            vertex=int(np.argmin(np.sum((co - place) ** 2, axis=1))),
+            is_ambiguous=bool(slides[i] or np.count_nonzero(good) > 1),  # It is good itself.
+        )
+        poses.append(pose)
     return poses
 
 
@@ -127,8 +129,7 @@ def _fields(mesh: ScanMesh, reach: float) -> tuple[Array, Array]:
         found = tree.query(origins, nearest, distance_upper_bound=reach)[1]
         local = (co[found] - origins[:, None]) @ axes
         weights = np.maximum(normals[found] @ axes[..., 2:], 0.0)
-        x, y = local.reshape(-1, 3)[:, :2].T
-        basis = weights * monomials(x, y, QUARTIC).reshape(*found.shape, -1)
+        basis = weights * monomials(local, QUARTIC)
         system = basis.swapaxes(1, 2) @ basis + POLYNOMIAL_RIDGE * np.eye(len(QUARTIC))
         fields.append(np.linalg.solve(system, basis.swapaxes(1, 2) @ (weights * local)[..., 2:])[..., 0])
     return places, np.concatenate(fields).T
@@ -140,10 +141,9 @@ def _scores(oriented: Array, fields: Array) -> Array:
     Residuals are projected off the span of 1, x and y, so that a small tilt and a shift along the normal cost
     nothing. On a quadric, neither does a small shift along the surface.
     """
-    x, y, z = oriented[0].T
-    weights = oriented[1, :, 2:]  # On a slope a height is more than the distance.
-    off = weights * (z[:, None] - monomials(x, y, QUARTIC) @ fields)
-    free = np.linalg.qr(weights * monomials(x, y, exponents(0, 1)))[0]
+    contacts, weights = oriented[0], oriented[1, :, 2:]  # On a slope a height is more than the distance.
+    off = weights * (contacts[:, 2:] - monomials(contacts, QUARTIC) @ fields)
+    free = np.linalg.qr(weights * monomials(contacts, exponents(0, 1)))[0]
     return np.sum(off**2, axis=0) - np.sum((free.T @ off) ** 2, axis=0)
 
 

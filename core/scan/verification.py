@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How far a patch is from its contacts and from a mesh (paper, V)."""
 
-import heapq
 import math
 from collections.abc import Iterator
 
@@ -104,8 +103,12 @@ def _spread(name: str, offsets: Array) -> dict[str, float]:
     """Mean, median, maximum and root mean square of distances by name; empty if there are none."""
     if not len(offsets):
         return {}
-    rms = math.sqrt(np.mean(offsets**2))
-    values = {"mean": offsets.mean(), "median": np.median(offsets), "max": offsets.max(), "rms": rms}
+    values = {
+        "mean": offsets.mean(),
+        "median": np.median(offsets),
+        "max": offsets.max(),
+        "rms": np.sqrt(np.mean(offsets**2)),
+    }
     return {f"{name}_distance_{key}": float(value) for key, value in values.items()}
 
 
@@ -129,21 +132,17 @@ def _azimuths_between(domain: Domain, count: int) -> list[float]:
     x, y = domain.ends.T
     lines = np.sort(np.arctan2(y, x) % math.pi)
     widths = np.diff(lines, append=lines[0] + math.pi)
-    inside = [0] * len(lines)
-    heap = [(-width, i) for i, width in enumerate(widths.tolist())]
-    heapq.heapify(heap)
+    inside = np.zeros(len(lines), dtype=np.intp)
     for _ in range(count):
-        _, i = heap[0]
-        inside[i] += 1
-        heapq.heapreplace(heap, (-float(widths[i]) / (inside[i] + 1), i))
-    shares = zip(lines.tolist(), widths.tolist(), inside, strict=True)
+        inside[np.argmax(widths / (inside + 1))] += 1
+    shares = zip(lines.tolist(), widths.tolist(), inside.tolist(), strict=True)
     return [line + width * k / (n + 1) for line, width, n in shares for k in range(1, n + 1)]
 
 
 def _start(r: Reconstruction, surface: Surface) -> Vector | None:
     """The place of the surface nearest to the reference point along the normal, or None."""
     hits = (_below(r, surface, (0.0, 0.0, reach * r.radius), 2.0 * reach * r.radius) for reach in FOOT_REACH)
-    return next((hit for hit in hits if hit is not None), None)
+    return next(filter(None, hits), None)
 
 
 def _overlap(r: Reconstruction, surface: Surface) -> float:

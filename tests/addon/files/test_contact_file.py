@@ -461,7 +461,7 @@ def test_numbers_that_no_curve_can_have_are_refused_with_their_place(read, data,
 
 
 def test_a_file_beyond_memory_is_a_sentence(read, extension, monkeypatch):
-    def exhausted(*_):
+    def exhausted(*_, **__):
         raise MemoryError
 
     monkeypatch.setattr(extension.core.contact_data.rows, "contours", exhausted)

@@ -157,7 +157,7 @@ def test_slopes_are_the_derivatives_of_the_heights():
     x, y, _ = local[0].T
 
     def height(x, y):
-        return monomials(x, y, TERMS) @ b
+        return monomials(np.stack([x, y], axis=-1), TERMS) @ b
 
     dx = (height(x + h, y) - height(x - h, y)) / (2.0 * h)
     dy = (height(x, y + h) - height(x, y - h)) / (2.0 * h)
@@ -170,8 +170,8 @@ def test_slopes_are_the_derivatives_of_the_heights():
     for direction in rng.normal(size=(5, 27)):
         misses = slopes[0] @ (1e-5 * direction)
         change = np.column_stack([
-            (monomials(x + h, y, TERMS) - monomials(x - h, y, TERMS)) @ direction,
-            (monomials(x, y + h, TERMS) - monomials(x, y - h, TERMS)) @ direction,
+            (monomials(local[0] + side, TERMS) - monomials(local[0] - side, TERMS)) @ direction
+            for side in h * np.eye(3)[:2]
         ]) / (2.0 * h)  # fmt: skip
         turned = np.column_stack([up[:, :2] + 1e-5 * change, -np.ones(9)])
         cross = np.linalg.norm(np.cross(up, turned), axis=1)
@@ -188,11 +188,10 @@ def test_the_evidence_is_that_of_heights_and_slopes_under_a_normal_distribution(
     data = sextic.sextics(local, weights, np.zeros((1, 27)), normals)
     variances = np.minimum(prior.prior_variances(np.array([0.4, 0.9])), 100.0)
     slopes, steepness = (part[0] for part in slope_equations(normals, local, weights))
-    x, y, heights = local[0].T
-    basis = np.vstack([monomials(x, y, TERMS), slopes])
+    heights, basis = local[0, :, 2], np.vstack([monomials(local[0], TERMS), slopes])
     for both in (True, False):
         count = 180 if both else 60
-        some = data.heights, data.counts, data.slopes if both else None
+        some = data.heights, data.counts, both * data.slopes
         found = evidence.neg2_log_evidence(*some, variances, noises)[0]
         wanted = np.empty((2, 2))
         for (w, i), _ in np.ndenumerate(wanted):
@@ -442,9 +441,7 @@ def test_normals_show_the_slopes_of_the_process_too():
     def features(p):
         """Terms and whitened covariances with the contacts: the places carry the process."""
         factor = places_factor(kernel(flat, flat, variances))
-        return np.column_stack(
-            [monomials(*p.T, TERMS), np.linalg.solve(factor, kernel(flat, p, variances)).T]
-        )
+        return np.column_stack([monomials(p, TERMS), np.linalg.solve(factor, kernel(flat, p, variances)).T])
 
     def slopes(axis):
         return (features(flat + step * axis) - features(flat - step * axis)) / (2.0 * step)
@@ -457,4 +454,4 @@ def test_normals_show_the_slopes_of_the_process_too():
     over = rng.uniform(-0.7, 0.7, (30, 2))
     assert found.height(*over.T) == pytest.approx(features(over) @ covariance @ basis.T @ felt, abs=1e-6)
     left = kernel(over, over, variances) - (f := features(over))[:, 27:] @ f[:, 27:].T + f @ covariance @ f.T
-    assert found.height_covariance(over, over) == pytest.approx(left, abs=1e-7)
+    assert found.covariances_with(over)(over)[0] == pytest.approx(left, abs=1e-7)

@@ -27,10 +27,10 @@ def touched(surface, planes=THREE, noise=0.0, seed=0, extent=EXTENT, **options):
 
 
 def test_turning_coefficients_about_the_normal_turns_the_surface():
-    b, (x, y) = np.random.default_rng(0).normal(size=27), np.random.default_rng(1).normal(size=(2, 9))
+    b, points = np.random.default_rng(0).normal(size=27), np.random.default_rng(1).normal(size=(9, 2))
     c, s = np.cos(0.7), np.sin(0.7)
-    turned = monomials(c * x + s * y, c * y - s * x, TERMS) @ posterior._turn(0.7) @ b
-    assert turned == pytest.approx(monomials(x, y, TERMS) @ b, rel=1e-9)
+    turned = monomials(points @ [[c, -s], [s, c]], TERMS) @ posterior._turn(0.7) @ b
+    assert turned == pytest.approx(monomials(points, TERMS) @ b, rel=1e-9)
 
 
 @pytest.mark.parametrize(("count", "freedom"), [(65, 60.0), (9, 5.0)])
@@ -54,8 +54,8 @@ def test_the_patch_of_a_lower_degree_is_the_nearest_over_the_disk():
     inside = np.hypot(x, y) < posterior.DISK
     x, y = x[inside], y[inside]
     for degree in (3, 4, 5):
-        fixed = monomials(x, y, TERMS[2:5]) @ mean[2:5]
-        basis = monomials(x, y, TERMS[5 : posterior.terms_to(degree)])
+        terms = monomials(np.column_stack([x, y]), TERMS[2 : posterior.terms_to(degree)])
+        fixed, basis = terms[:, :3] @ mean[2:5], terms[:, 3:]
         wanted = np.linalg.lstsq(basis, whole.height(x, y) - fixed, rcond=None)[0]
         assert whole.patch(degree).coefficients == pytest.approx(wanted, abs=0.05)
         assert [whole.patch(degree).k1, whole.patch(degree).k2] == [0.4, 0.6]
@@ -316,7 +316,8 @@ def test_few_contacts_are_enough_for_a_finite_answer():
 def test_without_evidence_the_waviness_is_the_priors(monkeypatch):
     """The prior is log-normal about 0.6."""
     monkeypatch.setattr(evidence, "neg2_log_evidence", lambda *_: np.zeros((1, 6, 5)))
-    found = evidence.hyperparameters(1e-12 * np.eye(28)[None], np.array([9.0]), None, np.array([0.01]))
+    heights = 1e-12 * np.eye(28)[None]
+    found = evidence.hyperparameters(heights, np.array([9.0]), np.zeros_like(heights), np.array([0.01]))
     w = evidence.WAVINESS
     density = np.exp(-0.5 * (np.log(w / 0.6) / 0.5) ** 2)
     density /= density.sum()
@@ -335,7 +336,7 @@ def test_a_degree_will_do_whose_patch_departs_by_half_a_deviation(ratio, degree)
     mean = np.zeros(27)
     mean[14] = 0.1
     uncertain = posterior.SurfacePosterior(mean, np.eye(28), 0.0, np.zeros((22, 22)))
-    basis = monomials(contacts[:, 0], contacts[:, 1], TERMS)
+    basis = monomials(contacts, TERMS)
     off = basis @ (mean - posterior.coefficients_of(uncertain.patch(4)))
     variance = np.sum(off**2) / ratio**2 / np.sum(basis**2)
     assert replace(uncertain, root=np.sqrt(variance) * np.eye(28)).degree_shown(contacts) == degree
@@ -409,8 +410,8 @@ def prior_mean(k1, k2):
 def test_the_priors_mean_goes_on_as_spheres_and_cylinders_do(k):
     """z = (1 - sqrt(1 - k^2 r^2)) / k is k r^2 / 2 + k^3 r^4 / 8 + k^5 r^6 / 16 and more."""
     rng = np.random.default_rng(1)
-    x, y = rng.uniform(-1.0, 1.0, (2, 20))
-    terms = monomials(x, y, TERMS)
+    points = rng.uniform(-1.0, 1.0, (20, 2))
+    (x, y), terms = points.T, monomials(points, TERMS)
     for pair, square in (((k, k), x**2 + y**2), ((k, 0.0), x**2), ((0.0, k), y**2)):
         wanted = k**3 * square**2 / 8.0 + k**5 * square**3 / 16.0
         assert terms @ prior_mean(*pair) == pytest.approx(wanted, rel=1e-9)
@@ -425,7 +426,7 @@ def test_the_priors_mean_between_is_that_of_a_surface_that_goes_on_and_of_a_toru
     a, b = k1**2, k2**2
     x, y = 0.3, -0.7
     whole = (k1 * x**2 + k2 * y**2) / 2.0 * (a * x**2 + b * y**2) ** 2 / 8.0
-    assert monomials(np.array([x]), np.array([y]), TERMS[20:]) @ mean[20:] == pytest.approx([whole])
+    assert monomials(np.array([[x, y]]), TERMS[20:]) @ mean[20:] == pytest.approx([whole])
 
 
 def test_the_suggested_plane_is_measured_as_the_contours_were_tracked():
@@ -452,11 +453,11 @@ def test_what_is_expected_of_a_plane_is_the_posterior_with_its_contacts_added(st
     count = round(len(r.contacts) / 3)
     few = min(count, 24)
     t = np.linspace(-1.0, 1.0, few)[:, None] * [np.cos(plane.azimuth), np.sin(plane.azimuth)]
-    basis = monomials(*t.T, TERMS)
+    basis = monomials(t, TERMS)
     noise = r.posterior.noise**2 * few / count
     after = np.linalg.inv(np.linalg.inv(r.posterior.covariance) + basis.T @ basis / noise)
     points, weights = r.domain.nodes
-    over = monomials(*points.T / r.radius, TERMS)
+    over = monomials(points / r.radius, TERMS)
     stds = np.sqrt(np.einsum("ni,ij,nj->n", over, after, over))
     assert expected == pytest.approx(r.radius * weights @ stds, rel=1e-5)
 
@@ -465,11 +466,11 @@ def test_a_height_at_the_origin_that_is_open_varies_with_the_terms():
     """The level and the 27 coefficients are one Gaussian of 28."""
     root = np.random.default_rng(4).normal(size=(28, 28))
     some = posterior.SurfacePosterior(np.zeros(27), root, np.array(0.1), np.zeros((22, 22)))
-    x, y = np.random.default_rng(5).uniform(-1.0, 1.0, (2, 9))
-    basis = np.column_stack([monomials(x, y, TERMS), np.ones(9)])
-    wanted, points = basis @ root.T @ root @ basis.T, np.column_stack([x, y])
-    assert some.height_std(x, y) ** 2 == pytest.approx(wanted.diagonal())
-    assert some.height_covariance(points, points) == pytest.approx(wanted)
+    points = np.random.default_rng(5).uniform(-1.0, 1.0, (9, 2))
+    basis = np.column_stack([monomials(points, TERMS), np.ones(9)])
+    wanted = basis @ root.T @ root @ basis.T
+    assert some.height_std(*points.T) ** 2 == pytest.approx(wanted.diagonal())
+    assert some.covariances_with(points)(points)[0] == pytest.approx(wanted)
 
 
 def test_a_stack_whose_touches_settle_one_after_the_other_gives_what_single_fits_give():

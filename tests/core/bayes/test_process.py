@@ -84,7 +84,7 @@ def test_the_mean_by_itself_is_that_of_the_posterior(weight):
     mean, alpha = process_fit._mean_given(touch, hyper, *touch.at_places())
     whole = process_posterior(touch, hyper, np.zeros((22, 22)))
     over = np.random.default_rng(1).uniform(-0.6, 0.6, (50, 2))
-    heights = monomials(*over.T, TERMS) @ mean
+    heights = monomials(over, TERMS) @ mean
     heights += weighted_kernel(over, contacts[:, :2], hyper.process, alpha)
     assert whole.height(*over.T) == pytest.approx(heights, abs=1e-4)
 
@@ -113,25 +113,25 @@ def test_derivatives_are_those_of_the_height():
 @pytest.mark.parametrize("noise", [7e-4, 5e-3])
 def test_mean_and_deviation_are_those_of_a_dense_gaussian_process(noise):
     _, r = touched(noise=noise)
-    contacts, (x, y, z) = r.contacts / r.radius, r.contacts.T / r.radius
+    contacts = r.contacts / r.radius
     sizes = np.array([4e-4, 9e-4])
-    touch = touch_of(contacts, np.ones(len(x)), contacts[:0], np.arange(len(x)))
+    touch = touch_of(contacts, np.ones(len(contacts)), contacts[:0], np.arange(len(contacts)))
     variances = np.minimum(prior_variances(np.array(USUAL_WAVINESS)), evidence.MOST_VARIANCE)
     hyper = evidence.Hyperparameters(variances, noise, sizes)
     surface = process_posterior(touch, hyper, np.zeros((22, 22)))
     places, points = contacts[:, :2], over(r) / r.radius
-    basis, wanted = monomials(x, y, TERMS), monomials(*points.T, TERMS)
+    basis, wanted = monomials(contacts, TERMS), monomials(points, TERMS)
 
     def covariance(p, q, basis_p, basis_q):
         return (basis_p * variances) @ basis_q.T + kernel.kernel(p, q, sizes)
 
-    seen = covariance(places, places, basis, basis) + noise**2 * np.eye(len(x))
+    seen = covariance(places, places, basis, basis) + noise**2 * np.eye(len(contacts))
     shared = covariance(points, places, wanted, basis)
-    mean = shared @ np.linalg.solve(seen, z)
+    mean = shared @ np.linalg.solve(seen, contacts[:, 2])
     left = covariance(points, points, wanted, wanted) - shared @ np.linalg.solve(seen, shared.T)
     assert surface.height(*points.T) == pytest.approx(mean, abs=1e-5)
     assert surface.height_std(*points.T) ** 2 == pytest.approx(np.diag(left), rel=1e-2, abs=1e-8)
-    assert surface.height_covariance(points, points) == pytest.approx(left, abs=1e-7)
+    assert surface.covariances_with(points)(points)[0] == pytest.approx(left, abs=1e-7)
 
 
 def test_the_patch_is_that_of_the_surface_over_a_disk():
@@ -139,15 +139,15 @@ def test_the_patch_is_that_of_the_surface_over_a_disk():
     covered = []
     for seed in range(25):
         height, r = touched(seed, azimuths=(0, 45, 90, 135))
-        x, y = QUARTIC_SHARE * r.radius * np.array(nodes()[:2]) / DISK
-        terms, shares = exponents(0, 4), np.sqrt(nodes()[2])[:, None]
-        at = shares * monomials(x, y, terms)
+        x, y = QUARTIC_SHARE * r.radius * nodes()[0].T / DISK
+        terms, shares = exponents(0, 4), np.sqrt(nodes()[1])[:, None]
+        at = shares * monomials(np.column_stack([x, y]), terms)
         b = np.linalg.lstsq(at, shares[:, 0] * r.height(x, y), rcond=None)[0][1:]
         assert [2.0 * b[2], 2.0 * b[4]] == pytest.approx([r.patch.k1, r.patch.k2], abs=0.02 / r.radius)
         assert np.hypot(b[0], b[1]) < 0.01 and abs(b[3]) < 0.02 / r.radius
         flat = r.frame.to_world(np.column_stack([x, y, r.height(x, y)]))[:, :2]
         true = r.frame.to_local(np.column_stack([flat, EXTENT * height(flat / EXTENT)]))
-        at = shares * monomials(*true[:, :2].T, terms)
+        at = shares * monomials(true, terms)
         b = np.linalg.lstsq(at, shares[:, 0] * true[:, 2], rcond=None)[0][1:]
         off = np.abs([2.0 * b[2] - r.patch.k1, 2.0 * b[4] - r.patch.k2])
         covered.append(off <= 1.645 * np.array([r.k1_std, r.k2_std]))
@@ -223,7 +223,7 @@ def test_heights_are_nearer_and_intervals_true_on_rough_surfaces(azimuths):
         at = r.frame.to_world(np.column_stack([flat, r.height(*flat.T)]))
         off = np.abs(at[:, 2] - EXTENT * height(at[:, :2] / EXTENT)) * r.frame.axes[2, 2]
         covered.append(np.mean(off <= 1.645 * r.height_std(*flat.T)))
-        sextic = r.radius * monomials(*flat.T / r.radius, TERMS) @ r.posterior.polynomial
+        sextic = r.radius * monomials(flat / r.radius, TERMS) @ r.posterior.polynomial
         at = r.frame.to_world(np.column_stack([flat, sextic]))
         errors.append([off.mean(), np.abs(at[:, 2] - EXTENT * height(at[:, :2] / EXTENT)).mean()])
         assert 0.002 < r.posterior.amplitude < 0.2
@@ -344,7 +344,7 @@ def test_the_derivatives_of_a_surface_with_a_process_are_those_of_its_height_in_
 def test_the_likelihoods_are_those_of_the_heights_under_a_normal_distribution():
     """The likelihoods agree up to the constant of 2 pi, with a process of any amplitude and without one."""
     flat = np.vstack([np.outer(REACHES[::2], [np.cos(a), np.sin(a)]) for a in np.radians([0, 60, 120])])
-    basis, heights = monomials(*flat.T, TERMS), rough(3)(flat)
+    basis, heights = monomials(flat, TERMS), rough(3)(flat)
     noises = np.array([1e-3, 2e-3, 4e-3])
 
     def neg2_log(covariance):
@@ -359,7 +359,7 @@ def test_the_likelihoods_are_those_of_the_heights_under_a_normal_distribution():
         within = amplitude**2 * kernel.kernels(flat, flat)[length]
         white = noise**2 * np.eye(len(flat))
         assert found == pytest.approx(neg2_log(of_terms[1] + within + white), rel=1e-6)
-    normal_equations = (rows @ rows.T)[None], np.array([len(flat)]), None
+    normal_equations = (rows @ rows.T)[None], np.array([len(flat)]), np.zeros((1, 28, 28))
     sextics = evidence.neg2_log_evidence(*normal_equations, variances, noises[None])[0]
     for (w, i), value in np.ndenumerate(sextics):
         wanted = neg2_log(of_terms[w] + noises[i] ** 2 * np.eye(len(flat)))

@@ -27,8 +27,8 @@ EXACT = {
 def frame_at(surface, planes, step, extent=None):
     contours = surface.track(planes, extent=extent or 6 * step, step=step)
     curves = through(contours, surface.point)
-    axes, k1, k2, radius = darboux_frames(curves, surface_normals(curves.tangents, surface.normal))
-    return axes[0], k1[0] / radius[0], k2[0] / radius[0]
+    axes, kappas, radius = darboux_frames(curves, surface_normals(curves.tangents, surface.normal))
+    return axes[0], *(kappas[0] / radius[0])
 
 
 def through(contours, point):

@@ -42,7 +42,7 @@ def test_a_moved_patch_is_the_patch_of_moved_contacts(scale, method):
     points = np.column_stack([x, y, r.height(x, y)])
     world = scale * r.frame.to_world(points) @ TURN.T + SHIFT
     assert moved.frame.to_world(scale * points) == pytest.approx(world, **near)
-    assert (moved.geometry.contains(scale * x, scale * y) == r.geometry.contains(x, y)).all()
+    assert (moved.domain.contains(scale * x, scale * y) == r.domain.contains(x, y)).all()
     for one, other in zip(moved.contours, r.contours, strict=True):
         assert one.points == pytest.approx(scale * other.points @ TURN.T + SHIFT, **near)
         assert one.plane_normal == pytest.approx(TURN @ other.plane_normal)

@@ -171,7 +171,7 @@ def test_all_that_tells_of_the_deviation_agrees():
     assert r.posterior.amplitude == 0.0
     assert mean_height_stds([r, r]) == pytest.approx([r.mean_height_std] * 2)
     flat = r.domain.grid(60)[0] / r.radius
-    variances = np.diagonal(r.posterior.height_covariance(flat, flat))
+    variances = np.diagonal(r.posterior.covariances_with(flat)(flat)[0])
     assert np.sqrt(variances) == pytest.approx(r.height_std(*(r.radius * flat).T) / r.radius)
 
 
