@@ -91,7 +91,7 @@ class StabilityMap:
         import scipy.spatial  # noqa: F401  # The import takes half a second, too long between redraws.
 
         self.surface = DetachedMesh(obj, depsgraph)
-        # A probe knows only the bounding box, and must find there what the map shows.
+        # A probe has only the bounding box, and must find there what the map shows.
         evaluated, linear, _ = evaluated_object(obj, depsgraph)
         self._farthest = FARTHEST_SHARE * size_of(evaluated, linear)
         if not spacing >= 0.0:  # NaN fails every comparison, so it is refused, too.

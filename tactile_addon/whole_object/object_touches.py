@@ -183,7 +183,7 @@ class ObjectTouches:
         self._rounds += not self._is_joining
         self._is_joining = True
         self.words = f"Joining {patches}" if state.joining < 1.0 else f"Checking the surface of {patches}"
-        # Nobody knows how often it goes back to touching. Each round has half of what is left.
+        # How often it goes back to touching is not known before. Each round has half of what is left.
         left = 0.5**self._rounds
         self.share = max(self.share, TOUCHED + (JOINED - TOUCHED) * (1.0 - (2.0 - state.joining) * left))
 
