@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import bpy
+import numpy as np
 
 from ..scene import patch_record
 from ..scene.attributes import DEVIATION, POSITION
 from ..scene.colors import shades, symmetric_range
 from ..scene.mesh_data import values
+from ..touch.arrays import read_array
 from ..touch.types import Object
 from ..touch.units import Unit
 from ..whole_object.object_report import object_summary, object_table_rows, unit_of
@@ -42,7 +44,8 @@ def _pictures(mesh: bpy.types.Mesh, unit: Unit, shown: str) -> str:
     limit = symmetric_range(shown_values, parts.LEAST_RANGE)
     low = 0.0 if shown in patch_record.POSITIVE else -1.0
     scale = page.figure(drawing.scale(limit, parts.label(1, unit), low), SCALE_WORDS[shown])
-    return page.section("Pictures", *views.three_sides(mesh, shades(shown_values, limit)), scale)
+    colors = shades(shown_values, limit)[read_array(mesh.loops, "vertex_index", dtype=np.int32)]
+    return page.section("Pictures", *views.three_sides(mesh, colors), scale)
 
 
 def _deviations(mesh: bpy.types.Mesh, record: Mapping[str, Any]) -> list[str]:

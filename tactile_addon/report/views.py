@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mesh from three sides, shaded, in the colors of its vertices."""
+"""A mesh from three sides, shaded, in the colors of its face corners."""
 
 from collections.abc import Iterator
 
@@ -23,11 +23,11 @@ VIEWS = (
 
 
 def three_sides(mesh: bpy.types.Mesh, colors: Array) -> Iterator[str]:
-    """Three figures of the mesh, in sRGB colors (n, 3 or 4) of its vertices."""
-    points = values(mesh, POSITION)
-    normals = read_array(mesh.vertices, "normal", 3)
+    """Three figures of the mesh, in sRGB colors (n, 3 or 4) of its face corners."""
+    at = read_array(mesh.loops, "vertex_index", dtype=np.int32)
+    points, normals = values(mesh, POSITION)[at], read_array(mesh.vertices, "normal", 3)[at]
     mesh.calc_loop_triangles()
-    corners = read_array(mesh.loop_triangles, "vertices", 3, np.int32)
+    corners = read_array(mesh.loop_triangles, "loops", 3, np.int32)
     for words, axes, sight, sign in VIEWS:
         # Shading shows the shape where colors are pale.
         light = DARKEST + (1.0 - DARKEST) * np.abs(normals[:, sight, None])

@@ -10,7 +10,7 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ..scene import colors, patch_object, patch_record
-from ..scene.attributes import HEIGHT_STD, MAP_COLOR, MEASURES, REASON
+from ..scene.attributes import CORNERS, HEIGHT_STD, MAP_COLOR, MEASURES, REASON
 from ..scene.mesh_data import emission, write
 from ..scene.shown import LEAST_RANGE
 from ..scene.viewports import show_colors
@@ -81,11 +81,17 @@ def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Ob
 
 
 def _paint(mesh: bpy.types.Mesh, touched: StabilityMap) -> None:
-    """Gives each vertex the values of its touch."""
+    """Gives each corner of a face the values of the touch in the face, or else of the one nearest to it.
+
+    Narrow faces may share all their vertices with wide ones, as on a plate, and have other values.
+    """
+    corners = read_array(mesh.loops, "vertex_index", dtype=np.int32)
+    within = np.repeat(touched.touch_in, read_array(mesh.polygons, "loop_total", dtype=np.int32))
+    touch = np.where(within < 0, touched.touch_of[corners], within)
     for name in MEASURES:
-        write(mesh, name, touched.measures[name][touched.touch_of])
-    write(mesh, REASON, touched.reason[touched.touch_of])
-    write(mesh, MAP_COLOR, np.ones((len(mesh.vertices), 4)))
+        write(mesh, name, touched.measures[name][touch], CORNERS)
+    write(mesh, REASON, touched.reason[touch], CORNERS)
+    write(mesh, MAP_COLOR, np.ones((len(touch), 4)), CORNERS)
     mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = MAP_COLOR
 
 
