@@ -197,7 +197,7 @@ class Atlas:
         if self.is_rough:
             rough = 100.0 * self._rough[0]
             return "uncertain", (
-                f"The deviation is above the tolerance on {rough:.0f} % of the surface: touch there "
+                f"The standard deviation is above the tolerance on {rough:.0f} % of the surface: touch there "
                 "again or use a larger tolerance."
             )
         return self._checked()

@@ -177,8 +177,8 @@ def _about_frame(r: Judged) -> Iterator[str]:
     std = r.posterior.curvature_std()
     if std > DOUBTFUL_CURVATURE:
         yield (
-            f"Curvatures are accurate to only {std / r.radius:.2g} in the least known direction: "
-            f"{_more_bend(r)}."
+            f"Curvatures are accurate to only {100.0 * std:.2g} % of 1 / radius in the least known "
+            f"direction: {_more_bend(r)}."
         )
 
 

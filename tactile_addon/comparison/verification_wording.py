@@ -31,7 +31,7 @@ def verification_summary(record: TouchReport) -> tuple[bool, str]:
     if not vertices:
         return (
             True,
-            f'No vertex of "{name}" is over the patch; the mesh covers {percent:.0f} % of it',
+            f'"{name}" has no vertices over the patch to measure, only faces, over {percent:.0f} % of it',
         )
     if record["status"] != "ok":
         return True, record["message"]

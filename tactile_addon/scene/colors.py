@@ -30,13 +30,9 @@ def symmetric_range(values: Array, floor: float) -> float:
     return max(float(one + (at - before) * (other - one)), floor)
 
 
-def least_range(values: Array, stds: Array) -> float:
-    """The least range of a scale where values (n,) differ from 0 by less than their deviations (n,), or 0.
-
-    Then nearly all of them are as good as 0, and their range is that of the deviations: all colors are pale.
-    """
-    significant = np.abs(values) > SIGNIFICANT * stds
-    return 0.0 if significant.mean() > FEW else symmetric_range(stds, 0.0)
+def are_as_good_as_0(values: Array, stds: Array) -> bool:
+    """Whether nearly all values (n,) differ from 0 by less than their deviations (n,)."""
+    return bool(np.mean(np.abs(values) > SIGNIFICANT * stds) <= FEW)
 
 
 def shades(values: ArrayLike, limit: float) -> Array:

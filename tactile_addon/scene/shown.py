@@ -13,7 +13,7 @@ from ..touch.arrays import read_array
 from ..touch.touch_report import TouchReport
 from ..touch.types import Array, Object
 from . import colors
-from .attributes import COLOR, CURVATURE_STD, CURVATURES, GAUSSIAN_STD, POSITION
+from .attributes import COLOR, CURVATURE_STD, CURVATURES, DEVIATION, GAUSSIAN_STD, POSITION
 from .mesh_data import ABOVE, own_mesh, values
 from .patch_record import (
     ATLAS_RECORD,
@@ -25,10 +25,13 @@ from .patch_record import (
     is_colored,
 )
 
-# The range of colors is no smaller, so that a plane is pale green: in units of the radius, and for a patch's
-LEAST_RANGE = 1e-3  # curvatures in units of the size of its object, as all patches of a mesh have it.
+# The range of colors is no smaller, so that a plane is pale green: in units of the radius,
+LEAST_RANGE = 1e-3
+LEAST_BEND = 1e-2  # for curvatures in units of the size of the object, as all patches of a mesh have it,
+# and for deviations of a whole object the tolerance.
 PALE = 0.05  # Values below this share of the range are pale.
-LEAST_SHARE = 0.5  # That of K is no smaller than this share of the median curvedness, squared.
+LEAST_SHARE = 0.5  # That of K is no smaller than this share of the median curvedness, squared,
+ERROR_SHARE = 8.0  # or than this one where K may be 0 all over the patch.
 LAYER = "tactile_layer"  # A patch's number among those that overlap; 0 is the lowest.
 ABOVE_OTHERS = "Above Other Patches"  # The modifier that draws it above those with lower numbers,
 APART = 2.0  # by this multiple of the deviations of the heights of both,
@@ -46,8 +49,7 @@ def recolor(obj: Object) -> None:
     shown, mesh = obj.tactile_colors, obj.data
     shades, record = values(mesh, shown), obj[RECORD if RECORD in obj else ATLAS_RECORD]
     unknown = _unknown(mesh) if shown in CURVATURES else []
-    length = record.get("object_size", record["radius"]) if shown in CURVATURES else record["radius"]
-    floor = LEAST_RANGE * length ** POWERS[shown]
+    floor = _least_range(record, shown)
     curvedness = np.delete(values(mesh, "curvedness"), unknown)
     if shown == "gaussian_curvature" and len(curvedness):
         # |K| is at most the square of the curvedness. Far below that, as on a cylinder, it is as good as 0.
@@ -66,12 +68,22 @@ def recolor(obj: Object) -> None:
     record["color_limit"] = limit
 
 
+def _least_range(record: Mapping[str, Any], shown: str) -> float:
+    if shown in CURVATURES:
+        return float(LEAST_BEND * record.get("object_size", record["radius"]) ** POWERS[shown])
+    if shown == DEVIATION and record.get("tolerance"):
+        return float(record["tolerance"])
+    return float(LEAST_RANGE * record["radius"] ** POWERS[shown])
+
+
 def _error_range(mesh: bpy.types.Mesh, shown: str, unknown: Any, floor: float) -> float:
-    """The range below which colors would show the errors of K, which is no range of other patches, or 0."""
+    """The range that makes K pale where it is as good as 0, which is no range of other patches; or 0."""
     if shown != "gaussian_curvature" or GAUSSIAN_STD not in mesh.attributes:
         return 0.0
     k, std = (np.delete(values(mesh, name), unknown) for name in (shown, GAUSSIAN_STD))
-    return 0.0 if colors.symmetric_range(k, 0.0) <= PALE * floor else colors.least_range(k, std)
+    if colors.symmetric_range(k, 0.0) <= PALE * floor or not colors.are_as_good_as_0(k, std):
+        return 0.0
+    return ERROR_SHARE / LEAST_SHARE * floor
 
 
 def _unknown(mesh: bpy.types.Mesh) -> Any:
@@ -96,13 +108,14 @@ def settle(patch: Object) -> None:
 
 
 def share_range(patch: Object, others: list[Object] | None = None) -> None:
-    """Gives all patches of its mesh that show what a patch shows the largest of their own ranges."""
+    """Gives all patches of its mesh that show what a patch shows the largest range of those not in doubt."""
     same = [
         obj
         for obj in (_others(patch) if others is None else others)
         if obj[RECORD]["source"] == patch[RECORD]["source"] and obj.tactile_colors == patch.tactile_colors
     ]
-    common = max(obj[RECORD].get("own_limit", 0.0) for obj in (patch, *same))
+    sure = [obj[RECORD] for obj in (patch, *same) if obj[RECORD]["status"] != "uncertain"]
+    common = max((record.get("own_limit", 0.0) for record in sure), default=0.0)
     for obj in (patch, *same):
         if obj.get(COMMON_RANGE) != common:
             obj[COMMON_RANGE] = common

@@ -25,6 +25,7 @@ from ..probes.probe_operators import (
 from ..scene import patch_record
 from ..scene.color_range import unit_of_range
 from ..scene.viewports import shows_colors
+from ..stability_map import map_report
 from ..stability_map.map_operator import TACTILE_OT_stability_map
 from ..stability_map.map_report import map_rows, median_rows
 from ..touch import units
@@ -197,7 +198,7 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         draw_rows(context, layout.box(), object_rows(record))
         if "touches" not in record:  # Measured contacts have no mesh to touch.
             return
-        text = f"Largest Deviation: {deviation(record, 'max')}"
+        text = f"Largest {'Gap' if record['uncovered'] else 'Deviation'}: {deviation(record, 'max')}"
         layout.operator(TACTILE_OT_look_farthest.bl_idname, text=text, icon="ZOOM_SELECTED", translate=False)
         layout.operator(TACTILE_OT_mesh_again.bl_idname, icon="MOD_REMESH")
         row = layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Surface", icon="EYEDROPPER")
@@ -215,6 +216,8 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
         layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Map", icon="EYEDROPPER").new = True
         _draw_colors(context, layout, obj, "tactile_map_colors")
         record = obj[patch_record.MAP_RECORD]
+        if words := map_report.facets(record):
+            draw_sentence(context, layout, words, "ERROR")
         box, unit = layout.box(), units.unit_of(context.scene, record["spacing"])
         draw_rows(context, box, map_rows(record, unit))
         medians, more = median_rows(record, unit), median_rows(record, unit, more=True)

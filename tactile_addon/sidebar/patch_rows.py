@@ -22,7 +22,7 @@ def main_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     if "height_std_rim" in record:
         rim = "± " + units.say(record["height_std_rim"], 1, unit)
     if record["is_verified"]:
-        mesh = _said(record, "vertex_distance_mean", 1, unit) if record["vertices"] else "–"
+        mesh = _said(record, "height_error", 1, unit) if "height_error" in record else "–"
     return [
         ("Principal Curvatures", ""),
         ("κ1", _measured(record, "k1", -1, unit)),

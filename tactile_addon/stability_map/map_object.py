@@ -140,14 +140,14 @@ def swatches(painted: Object) -> list[tuple[str, tuple[float, ...]]]:
 def touched_near(painted: Object, location: list[float]) -> list[float]:
     """The point nearest to a location at which a map was touched.
 
-    It is the location itself if that point is farther away than the spacing, as where the target was moved.
+    It is the location itself if that point is farther away than the map is large: the target was moved.
     """
     if PLACES not in painted:
         return location
     places = _applied(_array(painted.matrix_world), np.reshape(painted[PLACES], (-1, 3)))
     away = np.linalg.norm(places - np.array(location), axis=1)
     nearest = int(np.argmin(away)) if len(away) else None
-    is_near = nearest is not None and away[nearest] <= painted[patch_record.MAP_RECORD]["spacing"]
+    is_near = nearest is not None and away[nearest] <= max(painted.dimensions)
     return places[nearest].tolist() if is_near else location
 
 

@@ -16,6 +16,9 @@ from .stability import REASONS
 ZERO = 1e-6  # A median below this share of the spacing counts as 0.
 
 
+FACETED = 0.5  # The share of the patches from which on a map says that they follow facets.
+
+
 def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(label, value) of everything there is to say of a map."""
     refused = ", ".join(f"{key} {count}" for key, count in record["refused"].items())
@@ -46,13 +49,26 @@ def map_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     """(label, value) of how many patches a stability map has, and of the reasons why there are not more."""
     names, refused = {key: name for key, name, _ in REASONS}, [*record["refused"].items()]
     return [
-        ("Points", str(record["touched"])),
+        ("Points", _points(record)),
         ("Spacing", units.say(record["spacing"], 1, unit)),
         ("Patches", str(record["patches"])),
         ("… in Doubt", str(record["in_doubt"])),
         *([("No Patch", str(sum(count for _, count in refused)))] if refused else []),
         *((names[key], str(count)) for key, count in refused if count),
     ]
+
+
+def _points(record: Mapping[str, Any]) -> str:
+    touched, points = record["touched"], record["points"]
+    return str(points) if touched == points else f"{touched} of {points}"
+
+
+def facets(record: Mapping[str, Any]) -> str | None:
+    """A sentence if half of the patches or more follow facets, as the verdict on a patch has it; or None."""
+    count = record.get("few_facets", 0)
+    if count < max(FACETED * record["patches"], 1):
+        return None
+    return f"Curvature of the facets, not of the shape, at {many(count, 'point', 'points')}"
 
 
 def median_rows(record: Mapping[str, Any], unit: Unit, more: bool = False) -> list[tuple[str, str]]:

@@ -65,7 +65,7 @@ class StabilityMap:
     At its vertices a coarse mesh has creases, and most clicks are elsewhere.
 
     places : n arrays (3,), the places to touch as the surface has them, in random order
-    done : how many of these have been touched
+    done : how many of these have been touched; few_facets : how many patches follow facets
     measures, reason : (n,), what was found by each touch; the fields of `measures` are MEASURES
     touch_of : index of the touch nearest to each vertex of the mesh, once the steps are done
     touch_in : index of the touch in each face, or -1
@@ -108,7 +108,7 @@ class StabilityMap:
         _rehearse(planes, fit, **self._glance)
         self.places: list[Array] = []
         self._touched: list[int] = []  # the faces of these
-        self.done = 0
+        self.done = self.few_facets = 0
 
     def steps(self) -> Iterator[None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
@@ -186,7 +186,9 @@ class StabilityMap:
         result, surface = touch.result, self.surface
         off = core.height_error(result, surface)
         status, _ = core.judged_by_mesh(result, off or 0.0)
-        is_sure = status == "ok" and not core.has_few_facets(result, surface.face_near, surface.corners_of)
+        follows_facets = core.has_few_facets(result, surface.face_near, surface.corners_of)
+        self.few_facets += follows_facets
+        is_sure = status == "ok" and not follows_facets
         self.reason[number] = REASON_KEYS.index("patch" if is_sure else "doubt")
         self.measures[number] = (
             NOTHING if off is None else off,
@@ -205,6 +207,7 @@ class StabilityMap:
             "touched": self.done,
             "patches": counts.pop("patch") + counts["doubt"],
             "in_doubt": counts.pop("doubt"),
+            "few_facets": self.few_facets,
             "refused": counts,
         }
         for name in MEASURES:

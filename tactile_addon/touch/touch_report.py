@@ -108,6 +108,7 @@ class TouchReport(TypedDict, total=False):
     area: float
     total_absolute_curvature: float
     condition_number: float
+    height_error: float  # The mean distance in height from the mesh, over the domain.
     vertices: int  # Of the mesh, over the patch.
     vertex_distance_mean: float
     vertex_distance_max: float

@@ -69,9 +69,9 @@ def verdict(report: TouchReport, unit: Unit) -> str:
     ends = ((count, core.WHERE.get(stop, "")) for stop, count in stops.most_common())
     early = [(count, where) for count, where in ends if where.endswith(EARLY)]
     if early:
-        count, where = early[0]
+        count = sum(number for number, _ in early)
         number = "all" if count == stops.total() else f"{count} of {stops.total()}"
-        return f"Good, with {number} half curves cut short {where}"
+        return f"Good, with {number} half curves cut short {' or '.join(where for _, where in early)}"
     return f"Good: heights to ± {say(report['height_std'], 1, unit)}"
 
 

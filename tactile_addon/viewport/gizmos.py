@@ -76,27 +76,39 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         active = min(settings.active_plane, settings.plane_count - 1)
         self.point.matrix_basis = Matrix.Translation(center)
         self.point.hide = settings.target is None
-        ahead = _line_of_sight(context.region_data, center)
-        for i, (turn, tilt) in enumerate(zip(self.turns, self.tilts, strict=True)):
-            turn.hide, tilt.hide = i >= settings.plane_count, i != active
-            if not turn.hide:
-                t, up, _ = (Vector(axis) for axis in plane_axes(matrix, settings, i).T.tolist())
-                # If the tilt's plane is seen edge on, a little way of the mouse turns it by much.
-                tilt.hide = tilt.hide or abs(ahead.dot(t)) < STEEP
-                for each, arm in ((turn, HANDLE_REACH * reach * t), (tilt, UPRIGHT * reach * up)):
-                    self._put(context, each, center, arm)
-                    each.hide = each.hide or not apart(each.matrix_basis.translation)
+        planes = [plane_axes(matrix, settings, i).T.tolist() for i in range(settings.plane_count)]
+        arms = [(self.turns[i], HANDLE_REACH * reach * Vector(t)) for i, (t, _, _) in enumerate(planes)]
+        t, up = (Vector(axis) for axis in planes[active][:2])
+        # If the tilt's plane is seen edge on, a little way of the mouse turns it by much.
+        if abs(_line_of_sight(context.region_data, center).dot(t)) >= STEEP:
+            arms.append((self.tilts[active], UPRIGHT * reach * up))
+        for each in (*self.turns, *self.tilts):
+            each.hide = True
+        taken: list[Any] = []
+        for each, arm in arms:
+            self._put(context, each, center, arm, taken)
+            each.hide = not apart(each.matrix_basis.translation)
         self.extent.hide = not apart(center + reach * _right(context))
         self.extent.matrix_basis = Matrix.LocRotScale(center, matrix.to_quaternion(), [reach] * 3)
 
-    def _put(self, context: bpy.types.Context, handle: Any, center: Vector, arm: Vector) -> None:
-        """Puts a handle at the first end where the view is free, or if there is none, at the first one."""
+    def _put(
+        self, context: bpy.types.Context, handle: Any, center: Vector, arm: Vector, taken: list[Any]
+    ) -> None:
+        """Puts a handle at the first end where the view is free, or if there is none, at the first one.
+
+        taken : where the handles are that were put before, in the region; this one is added
+        """
+        margin = MARGIN * context.preferences.system.ui_scale
+
+        def is_good(end: float) -> bool:
+            at = _seen(context, center + end * arm)
+            return is_free(context, at, margin) and all((at - other).length > 2.0 * margin for other in taken)
+
         if not handle.is_modal:  # One that is dragged stays at its end.
-            margin = MARGIN * context.preferences.system.ui_scale
-            free = (end for end in ENDS if is_free(context, _seen(context, center + end * arm), margin))
-            self.ends[handle] = next(free, ENDS[0])
+            self.ends[handle] = next(filter(is_good, ENDS), ENDS[0])
         place: Any = center + self.ends[handle] * arm
         handle.matrix_basis = Matrix.Translation(place)
+        taken += filter(None, [_seen(context, place)])
 
     def _shrink(self, context: bpy.types.Context, center: Vector, reach: float) -> Callable[[Vector], bool]:
         """Makes the balls smaller if the patch is small in the view, so that they do not hide it.

@@ -223,8 +223,10 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
                 touched = touch(obj, depsgraph, location, toward=eye, **touch_arguments(self))
                 self._seen["touched"] = touched
                 unit = units.unit_of(context.scene, touched.result.radius)
-                bends = curvatures(touched.report, unit)
-                words = short = f"{touched.report['source']}: principal curvatures {bends}"
+                is_sure = touched.report["status"] == "ok"
+                bends = f"principal curvatures {curvatures(touched.report, unit)}"
+                result = bends if is_sure else verdict(touched.report, unit)
+                words = short = f"{touched.report['source']}: {result}"
         except ValueError as error:
             words = self._seen["refusal"] = sentence(error)
             short = "No touch is possible here"

@@ -117,7 +117,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
 
     def _done(self) -> Progress:
         if self._touches.is_stopped:
-            self.stop = "Drop It"
+            self.stop = "Discard the Surface"
         share = self._touches.share
         return f"{self._touches.words}: {share:.0%}", share
 

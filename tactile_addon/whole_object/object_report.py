@@ -101,7 +101,8 @@ def object_summary(record: Mapping[str, Any]) -> str:
     std = units.say(record["height_std"], 1, unit_of(record))
     if "touches" in record:
         touches, off = many(record["touches"], "touch", "touches"), deviation(record, "mean")
-        return f"{verdict_of(record)}: {touches}; {_surface(record)}; {off} off the mesh on average"
+        off = "" if record["uncovered"] else f"; {off} off the mesh on average"
+        return f"{verdict_of(record)}: {touches}; {_surface(record)}{off}"
     patches = f"{many(record['patches'], 'patch', 'patches')} of {_contacts(record)}"
     return f"{verdict_of(record)}: {patches}; {_surface(record)}; ± {std}"
 
@@ -116,11 +117,12 @@ def object_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("Rims Left", record.get("uncovered") or None),
         ("Tolerance", _tolerance(record)),
         ("Height", f"± {units.say(record['height_std'], 1, unit_of(record))}"),
-        ("Off the Mesh", deviation(record, "mean")),
+        # Where touches could go on, most of it would be the object that was not felt.
+        ("Off the Mesh", None if record.get("uncovered") else deviation(record, "mean")),
         ("Patches", record["patches"]),
         ("Edge Length", _edge(record)),
         ("Vertices", record["vertices"]),
-        ("… without K", record.get("unknown_curvatures") or None),
+        ("… Without Curvature", record.get("unknown_curvatures") or None),
     )
 
 

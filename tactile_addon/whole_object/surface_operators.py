@@ -12,14 +12,16 @@ from ..probes.in_slices import InSlices, Progress
 from ..probes.number_fields import dragged, fields
 from ..probes.operators import is_in_object_mode, make_active, polls, report_error
 from ..scene import patch_record
-from ..scene.mesh_data import own_mesh
+from ..scene.attributes import DEVIATION
+from ..scene.mesh_data import own_mesh, values
 from ..touch.arrays import read_array
 from ..touch.settings import draw_chosen, length_property
 from ..touch.types import Object, Outcome, Point
 from . import kept, whole_mesh
-from .object_report import object_summary
+from .object_report import deviation, object_summary
 
 SEEN = 0.4  # The view is as wide as this share of the object's size.
+REACHED = 0.5  # Where less than this share of the largest deviation is the surface's, it is the object's.
 
 
 def surface_of(context: bpy.types.Context) -> Object | None:
@@ -29,7 +31,7 @@ def surface_of(context: bpy.types.Context) -> Object | None:
 
 
 class TACTILE_OT_look_farthest(bpy.types.Operator):
-    """Look where surface and mesh are farthest apart, select the vertex there, and put the 3D cursor there"""
+    """Look where surface and mesh are farthest apart, and show deviations. The 3D cursor marks the place"""
 
     bl_idname = "tactile.look_farthest"
     bl_label = "Look at Largest Deviation"
@@ -52,6 +54,7 @@ class TACTILE_OT_look_farthest(bpy.types.Operator):
         place = Vector(np.subtract(record["deviation_place"], record["origin"]))
         own_mesh(obj)
         nearest = _select_nearest(obj.data, place)
+        is_reached = abs(values(obj.data, DEVIATION)[nearest.index]) >= REACHED * record["deviation_max"]
         make_active(context, obj)
         place, turn = obj.matrix_world @ place, obj.matrix_world.to_quaternion()
         context.scene.cursor.location = place
@@ -61,6 +64,10 @@ class TACTILE_OT_look_farthest(bpy.types.Operator):
             view.view_location = place
             view.view_rotation = (turn @ nearest.normal).to_track_quat("Z", "Y")
             view.view_distance = SEEN * record["size"] * obj.matrix_world.median_scale
+        obj.tactile_colors = DEVIATION
+        off, source = deviation(record, "max"), record["source"]
+        reach = "" if is_reached else ", which does not reach it"
+        self.report({"INFO"}, f'Here "{source}" is {off} off the surface{reach}')
         return {"FINISHED"}
 
 

@@ -152,10 +152,9 @@ def test_the_range_of_a_flat_patch_follows_what_is_significant(empty):
     for location in ((0.997, 0.997, 1.0), (0.1, 0.2, 1.0)):
         patch = touch(empty, location, target="Cube", extent=0.0)
         ranges.append(patch["tactile"]["own_limit"])
-    assert ranges == pytest.approx([1e-3 / 2.0**2] * 2)
+    assert ranges == pytest.approx([1e-2 / 2.0**2] * 2)
     noisy = touch(empty, (-0.1, 0.2, 1.0), target="Cube", noise=1e-3)
-    largest = np.abs(values(noisy.data, "gaussian_curvature")).max()
-    assert noisy["tactile"]["own_limit"] >= 2.0 * noisy["tactile"]["gaussian_curvature_std"] > largest > 0.0
+    assert 0.0 < np.abs(values(noisy.data, "gaussian_curvature")).max() < noisy["tactile"]["color_limit"]
 
 
 def test_a_map_is_above_its_mesh_and_below_patches(empty, ball):

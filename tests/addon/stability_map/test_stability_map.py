@@ -542,7 +542,9 @@ def test_a_map_of_a_plane_is_one_patch_without_error(empty, extension):
     assert dict(report.map_table_rows(record))["median error"] == "0 m"
 
 
-def test_a_map_of_few_facets_is_in_doubt(empty):
+def test_a_map_of_few_facets_is_in_doubt_and_says_why(empty, extension):
     empty.ops.mesh.primitive_torus_add()
     _, record = stability_map(empty, spacing=0.5)
-    assert record["in_doubt"] == record["patches"] > 5
+    assert record["in_doubt"] == record["few_facets"] == record["patches"] > 5
+    words = extension.tactile_addon.stability_map.map_report.facets(record)
+    assert words == f"Curvature of the facets, not of the shape, at {record['patches']} points"

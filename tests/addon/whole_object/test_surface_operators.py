@@ -90,6 +90,7 @@ def test_the_farthest_place_is_shown_where_the_surface_is_now(empty, surface):
     found = positions(surface.data)[nearest] + np.array(surface.location)
     assert np.linalg.norm(found - place) < 0.1
     assert empty.context.view_layer.objects.active == surface
+    assert surface.tactile_colors == "deviation"
 
 
 @pytest.mark.long

@@ -223,10 +223,8 @@ def test_a_curve_shorter_than_a_quarter_of_the_radius_leaves_doubt():
         assert s.fit(contours).status == "ok"
         r = s.fit(cut_short(contours, s.point))
         assert r.status == "uncertain"  # whichever doubt comes first
-        if (
-            f"Curvatures are accurate to only {r.posterior.curvature_std() / r.radius:.2g} in the least"
-            in r.message
-        ):
+        percent = 100.0 * r.posterior.curvature_std()
+        if f"Curvatures are accurate to only {percent:.2g} % of 1 / radius in the least" in r.message:
             assert "known direction: use a longer extent or add sampling planes" in r.message
             open_curvature += 1
     assert open_curvature > 2
