@@ -25,8 +25,8 @@ from ..probes.probe_operators import (
 from ..scene import patch_record
 from ..scene.color_range import unit_of_range
 from ..scene.viewports import shows_colors
-from ..stability_map import map_report
 from ..stability_map.map_operator import TACTILE_OT_stability_map
+from ..stability_map.map_report import facets as map_facets
 from ..stability_map.map_report import map_rows, median_rows
 from ..touch import units
 from ..touch.settings import draw_chosen, draw_sensor, draw_solver
@@ -216,7 +216,7 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
         layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Map", icon="EYEDROPPER").new = True
         _draw_colors(context, layout, obj, "tactile_map_colors")
         record = obj[patch_record.MAP_RECORD]
-        if words := map_report.facets(record):
+        if words := map_facets(record):
             draw_sentence(context, layout, words, "ERROR")
         box, unit = layout.box(), units.unit_of(context.scene, record["spacing"])
         draw_rows(context, box, map_rows(record, unit))

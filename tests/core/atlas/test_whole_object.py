@@ -237,9 +237,8 @@ def test_a_small_budget_leaves_places_uncovered_and_says_where_to_go_on():
 def test_a_surface_less_certain_than_the_tolerance_is_doubted_and_touched_next_where_it_is_least(ball):
     strict = replace(ball, tolerance=1e-9)
     assert strict.status == "uncertain"
-    assert strict.message.startswith(
-        "The standard deviation is above the tolerance on 100 % of the surface: touch"
-    )
+    words = "The standard deviation is above the tolerance on 100 % of the surface: touch"
+    assert strict.message.startswith(words)
     mesh, touch = ball.reference.mesh, strict.next_touch()
     assert abs(np.linalg.norm(touch.point) - 1.0) < 5e-3
     assert (touch.point == mesh.vertices[mesh.std.argmax()]).all()
