@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..steps import chunked
-from ..triangles import normalized
+from ..triangles import normalized, row_dot
 from .charts import Charts
 from .field import sheet_facing
 from .tetrahedra import Indices, sides_of, split_sides
@@ -43,14 +43,11 @@ def insert_creases(
     vertices, free, unfelt = vertices.copy(), np.ones(len(vertices), dtype=bool), np.zeros(len(vertices))
     sides = sides_of(triangles, len(vertices))
     yield 0.9
-    sharp = np.einsum("ni,ni->n", normals[sides[:, 0]], normals[sides[:, 1]]) < SHARP
-    sides = sides[sharp]
-    at_crease = np.zeros(len(vertices), dtype=bool)
-    at_crease[sides] = True
+    sides = sides[row_dot(normals[sides[:, 0]], normals[sides[:, 1]]) < SHARP]
+    at_crease = np.bincount(sides.ravel(), minlength=len(vertices)) > 0
     some = triangles[at_crease[triangles].all(axis=1)]
     a, b, c = normals[some].transpose(1, 0, 2)
-    turned = [np.einsum("ni,ni->n", u, v) < SHARP for u, v in ((a, b), (b, c), (c, a))]
-    some = some[np.all(turned, axis=0)]
+    some = some[np.all([row_dot(u, v) < SHARP for u, v in ((a, b), (b, c), (c, a))], axis=0)]
     for corner, beyond, at in _corners(charts, vertices, normals, some, edge):
         vertices[at], unfelt[at], free[at] = corner, beyond, False
     yield 0.9

@@ -16,7 +16,7 @@ from ..arguments import Array
 from ..triangles import LEAST_DIVISOR, normalized, triangle_cross
 from .creases import SHARP
 from .meshing import Mesh
-from .tetrahedra import Indices
+from .tetrahedra import Indices, keyed_sides
 
 # python -m benchmarks.atlas --only ring and --only egg chose these.
 SAGITTA = 80.0  # A quadric is so wide that its sagitta is this many deviations of the surface.
@@ -70,8 +70,7 @@ def _ends(mesh: Mesh, normals: Array) -> Indices:
 
     A folded triangle does not turn the normals at its corners, which are those of larger triangles, too.
     """
-    sides = mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    keys = np.minimum(*sides.T) * len(mesh.vertices) + np.maximum(*sides.T)
+    sides, keys = keyed_sides(mesh.triangles, len(mesh.vertices))
     order = np.argsort(keys, kind="stable")  # It is the fastest here.
     first = np.flatnonzero(np.diff(keys[order]) == 0)
     pairs = np.stack([order[first], order[first + 1]])

@@ -140,8 +140,7 @@ def _each_once(strokes: list[Contour]) -> tuple[list[Contour], Array]:
     """The strokes without contacts that earlier ones have, too, which add nothing; all contacts (n, 3)."""
     points = np.vstack([np.empty((0, 3)), *(stroke.points for stroke in strokes)])
     order, starts = equal_points(points)
-    is_first = np.zeros(len(points), dtype=bool)
-    is_first[order[starts]] = True
+    is_first = np.bincount(order[starts], minlength=len(points)) > 0
     found, ends = [], np.cumsum([len(stroke.points) for stroke in strokes])
     for stroke, end in zip(strokes, ends.tolist(), strict=True):
         which = is_first[end - len(stroke.points) : end]

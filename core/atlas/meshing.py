@@ -20,7 +20,7 @@ from .creases import insert_creases
 from .field import INSIDE, SurfaceSample, surface_at
 from .finger import FACING
 from .indicator import Indicator
-from .tetrahedra import Indices, march, smoothed, subdivided, tetrahedra_of, unique
+from .tetrahedra import Indices, keyed_sides, march, smoothed, subdivided, tetrahedra_of, unique
 
 # python -m benchmarks.atlas judges these.
 CELL = 2.1  # A cube of the lattice is as long as this many edges of the mesh.
@@ -83,8 +83,7 @@ class Mesh(NamedTuple):
 
     def chosen(self, which: NDArray[np.bool_]) -> "Mesh":
         """Some of the triangles, and their vertices."""
-        used = np.zeros(len(self.vertices), dtype=bool)
-        used[self.triangles[which]] = True
+        used = np.bincount(self.triangles[which].ravel(), minlength=len(self.vertices)) > 0
         index = np.cumsum(used) - 1
         return Mesh(self.vertices[used], index[self.triangles[which]], self.std[used], self.patch[used])
 
@@ -94,8 +93,7 @@ class Mesh(NamedTuple):
 
         Also which sides (3 m,) no other triangle has, and whether each edge belongs to exactly two.
         """
-        sides = self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-        keys = sides.min(axis=1) * len(self.vertices) + sides.max(axis=1)
+        sides, keys = keyed_sides(self.triangles, len(self.vertices))
         order = np.sort(keys)
         first = np.flatnonzero(np.diff(order, prepend=-1))
         counts = np.diff(first, append=len(order))
@@ -291,9 +289,7 @@ def _reproject(
 def _folded(vertices: Array, normals: Array, triangles: Indices) -> NDArray[np.bool_]:
     """Which vertices (n,) are of triangles that face against the normals (n, 3) of the surface."""
     against = row_dot(triangle_cross(vertices[triangles]), normals[triangles].sum(axis=1)) < 0.0
-    folded = np.zeros(len(vertices), dtype=bool)
-    folded[triangles[against]] = True
-    return folded
+    return np.bincount(triangles[against].ravel(), minlength=len(vertices)) > 0
 
 
 def _project_onto_surface(

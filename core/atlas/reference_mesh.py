@@ -78,9 +78,7 @@ class ReferenceMesh:
     @cached_property
     def is_open(self) -> NDArray[np.bool_]:
         """Whether the mesh ends at each vertex, (n,)."""
-        found = np.zeros(len(self.mesh.vertices), dtype=bool)
-        found[self.mesh.border] = True
-        return found
+        return np.bincount(self.mesh.border.ravel(), minlength=len(self.mesh.vertices)) > 0
 
     @cached_property
     def angles(self) -> Array:

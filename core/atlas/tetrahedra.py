@@ -23,19 +23,15 @@ FACE_CORNERS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])  # The corners of 
 
 def unique(rows: Indices) -> Indices:
     """The different ones among rows (n, 3) of whole numbers."""
-    return rows[np.unique(_keys(rows), return_index=True)[1]]
+    low = rows.min(axis=0)
+    keys = np.ravel_multi_index(tuple((rows - low).T), tuple(rows.max(axis=0) - low + 1))
+    return rows[np.unique(keys, return_index=True)[1]]
 
 
 def _different(numbers: Indices) -> Indices:
     """The different ones among whole numbers, in order; numpy's own way is ten times as slow."""
     order = np.sort(numbers, axis=None)
     return order[np.diff(order, prepend=order[:1] - 1) > 0]
-
-
-def _keys(rows: Indices) -> Indices:
-    """A number (n,) for each of the rows (n, 3) of whole numbers, equal only for equal rows."""
-    low = rows.min(axis=0)
-    return np.ravel_multi_index(tuple((rows - low).T), tuple(rows.max(axis=0) - low + 1))
 
 
 def tetrahedra_of(cells: Indices) -> Generator[float, None, tuple[Indices, Indices]]:
@@ -66,15 +62,14 @@ def tetrahedra_of(cells: Indices) -> Generator[float, None, tuple[Indices, Indic
 
 def march(tetrahedra: Indices, values: Array) -> tuple[Indices, Indices]:
     """Lattice edges (n, 2) that the surface crosses, and its triangles (m, 3) between these crossings."""
-    inside = values < 0.0
-    signs = inside[tetrahedra]
+    signs = (values < 0.0)[tetrahedra]
     mixed = signs.any(axis=1) & ~signs.all(axis=1)
     tetrahedra, signs = tetrahedra[mixed], signs[mixed]
     case = signs @ (1 << np.arange(4))
     table = _table()
     corners = [tetrahedra[case == code][:, table[code]].reshape(-1, 2) for code in range(1, 15)]
-    ends = np.sort(np.concatenate(corners), axis=1)
-    keys = ends[:, 0] * len(values) + ends[:, 1]
+    ends = np.concatenate(corners)
+    keys = ends.min(axis=1) * len(values) + ends.max(axis=1)
     distinct = _different(keys)
     crossed: Indices = np.stack(np.divmod(distinct, len(values)), axis=1)
     return crossed, np.searchsorted(distinct, keys).reshape(-1, 3)
@@ -123,11 +118,19 @@ def smoothed(vertices: Array, normal: Array, triangles: Indices) -> Array:
     return vertices + SMOOTHING_SHARE * move
 
 
+def keyed_sides(triangles: Indices, count: int) -> tuple[Indices, Indices]:
+    """The sides (3 m, 2) of triangles (m, 3) between `count` vertices, triangle by triangle.
+
+    Also numbers (3 m,) that are equal for the same edge, whichever way a triangle goes along it.
+    """
+    sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    return sides, sides.min(axis=1) * count + sides.max(axis=1)
+
+
 def sides_of(triangles: Indices, count: int) -> Indices:
-    """The different edges (n, 2) of triangles (m, 3) between `count` vertices."""
-    ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    keys = _different(ends.min(axis=1) * count + ends.max(axis=1))
-    return np.stack(np.divmod(keys, count), axis=1)
+    """The different edges (n, 2) of triangles (m, 3) between `count` vertices, the lower index first."""
+    _, keys = keyed_sides(triangles, count)
+    return np.stack(np.divmod(_different(keys), count), axis=1)
 
 
 def subdivided(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
@@ -138,13 +141,12 @@ def subdivided(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
 
 
 def split_sides(triangles: Indices, sides: Indices, new: int) -> Indices:
-    """Triangles with vertices new, new + 1, ... on sides (n, 2)."""
+    """Triangles (m, 3) split at vertices new, new + 1, ... on sides (n, 2), the lower index first."""
     if not len(sides):
         return triangles
     keys = sides[:, 0] * new + sides[:, 1]
     order = np.argsort(keys)
-    ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
-    wanted = ends[..., 0] * new + ends[..., 1]
+    wanted = keyed_sides(triangles, new)[1].reshape(-1, 3)
     at = np.minimum(np.searchsorted(keys[order], wanted), len(keys) - 1)
     middle = np.where(keys[order][at] == wanted, new + order[at], -1)
     halves = (middle >= 0).sum(axis=1)
