@@ -272,27 +272,19 @@ def _rounded(gain: float) -> float:
 
 def _between(points: Array, tried: Sequence[Vector]) -> int:
     """The index of the point (n, 3) in the middle of all, or farthest from where touches were in vain."""
-    if not tried:
-        return _first_least(((points - points.mean(axis=0)) ** 2).sum(axis=1))
-    apart = points[:, None] - np.array(tried)
-    return _first_least(-(apart**2).sum(axis=2).min(axis=1))
-
-
-def _first_least(squares: Array) -> int:
-    """The first index of squared distances (n,), or of their negatives, that are least up to a tie."""
+    if tried:
+        squares = -((points[:, None] - np.array(tried)) ** 2).sum(axis=2).min(axis=1)
+    else:
+        squares = ((points - points.mean(axis=0)) ** 2).sum(axis=1)
     return int(np.argmax(squares <= squares.min() + TIE * np.abs(squares).max()))
 
 
 def border_places(mesh: Mesh) -> Iterator[RimPlace]:
     """Places on the border of a mesh, some edges apart, with the way beyond it."""
-    ends, corners = mesh.border, mesh.vertices
-    if not len(ends):
-        return
-    radius = BORDER_RADIUS * mesh.edge
+    ends, corners, radius = mesh.border, mesh.vertices, BORDER_RADIUS * mesh.edge
     normals, taken = mesh.normals, np.zeros(len(ends), dtype=bool)
     middles = corners[ends].mean(axis=1)
-    for i in range(len(ends)):
-        a, b = ends[i]
+    for i, (a, b) in enumerate(ends):
         if taken[i]:
             continue
         taken |= ((middles - middles[i]) ** 2).sum(axis=1) < (BORDER_APART * radius) ** 2

@@ -21,6 +21,7 @@ from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
 from .object_atlas import Atlas, joined_surface
 from .orientation import doubt_of, oriented, place_text, planes_of, sharpened
+from .tetrahedra import connected_pieces
 from .unfelt import uncovered_places
 
 # python -m benchmarks.robot judges these.
@@ -215,18 +216,13 @@ class _Cloud(NamedTuple):
 
     def same_sheet(self, i: int, radius: float) -> NDArray[np.intp]:
         """Those contacts around contact i that face the same way and are linked with it, so of its wall."""
-        from scipy.sparse import csr_array
-        from scipy.sparse.csgraph import connected_components
-
         near = np.array(self.tree.query_ball_point(self.contacts.points[i], radius))
         near = near[self.contacts.normals[near] @ self.contacts.normals[i] > FACING]
         links, order = self.contacts.links[near], np.argsort(near)
         at = order[np.minimum(np.searchsorted(near, links, sorter=order), len(near) - 1)]
         linked = near[at] == links
-        ends = np.append(0, np.cumsum(linked.sum(axis=1)))
-        graph = csr_array((np.ones(ends[-1]), at[linked], ends), (len(near), len(near)))
-        wall = connected_components(graph, directed=False)[1]
-        return near[wall == wall[np.flatnonzero(near == i)]]
+        _, piece = connected_pieces(np.nonzero(linked)[0], at[linked], len(near))
+        return near[piece == piece[np.flatnonzero(near == i)]]
 
     def patches(self, places: Sequence[int], radius: float) -> list[Reconstruction | None]:
         """The patch of those contacts around each place that are of its wall; None where they carry none."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arguments import Array
 from ..triangles import normalized
-from .tetrahedra import Indices
+from .tetrahedra import Indices, connected_pieces
 
 # python -m benchmarks.measured --orientation judges these.
 FEWEST, MOST, MORE = 8, 600, 1.5  # The numbers of a plane's neighbors, and their growth until it is certain:
@@ -159,12 +159,10 @@ def _bridged(
     points: Array, normals: Array, i: Indices, j: Indices, weights: Array
 ) -> tuple[Indices, Indices, Array]:
     """The links and those between pieces that they do not connect, from the nearest contacts of these."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     while True:
-        count, piece = connected_components(coo_matrix((np.ones(len(i)), (i, j)), (len(points),) * 2))
+        count, piece = connected_pieces(i, j, len(points))
         if count == 1:
             return i, j, weights
         largest = np.bincount(piece).argmax()
@@ -205,12 +203,8 @@ def _propagated_signs(
 
 def _regions(tree: Any, n: int) -> Indices:
     """The regions (n,) of a tree that its uncertain links separate; small ones join adjacent ones."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     certain = tree.data < CERTAIN
-    links = np.ones(certain.sum()), (tree.row[certain], tree.col[certain])
-    count, region = connected_components(coo_matrix(links, (n, n)))
+    count, region = connected_pieces(tree.row[certain], tree.col[certain], n)
     sizes, first = np.bincount(region).tolist(), list(range(count))
 
     def of(one: int) -> int:

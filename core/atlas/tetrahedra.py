@@ -140,6 +140,17 @@ def subdivided(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
     return np.vstack([vertices, middles]), split_sides(triangles, sides, len(vertices))
 
 
+def connected_pieces(i: Indices, j: Indices, count: int) -> tuple[int, Indices]:
+    """The number of connected components of a graph, and the one of each of `count` nodes, (count,).
+
+    i, j : (m,), the nodes that are linked, both ways
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    return connected_components(coo_matrix((np.ones(len(i)), (i, j)), (count, count)), directed=False)
+
+
 def split_sides(triangles: Indices, sides: Indices, new: int) -> Indices:
     """Triangles (m, 3) split at vertices new, new + 1, ... on sides (n, 2), the lower index first."""
     if not len(sides):
