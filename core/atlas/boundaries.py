@@ -93,8 +93,7 @@ def _crossings(
     turns = 2.0 * np.pi * np.arange(RAYS) / RAYS
     out = MARGIN * np.arange(1, RAY_PLACES + 1) / (RAY_PLACES + 1)
     rays = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-    each = np.full(RAYS, node)
-    unit = 1.0 / np.maximum(charts.shares(rays[:, 0], rays[:, 1], each), 1e-9)
+    unit = 1.0 / np.maximum(charts.shares(rays[:, 0], rays[:, 1], np.full(RAYS, node)), 1e-9)
     xy = (rays * unit[:, None])[:, None] * out[:, None]
     points, normals = charts.world(np.full(RAYS * RAY_PLACES, node), *xy.reshape(-1, 2).T)
     pairs = charts.pairs(points)

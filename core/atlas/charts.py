@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..steps import chunked, result_of
 from ..triangles import normalized, row_dot
 from .cubic_spline import CUBIC, SIDE, bspline_weights, cubics
 
@@ -203,11 +204,9 @@ class Charts:
     def inside(self, share: float) -> NDArray[np.bool_]:
         """Which knots are within this share of the domains' radii, (n, SIDE, SIDE)."""
         x, y = self.knots().reshape(2, -1)
-        patch, found = np.repeat(np.arange(len(self.radii)), SIDE**2), np.zeros(len(x), dtype=bool)
-        for start in range(0, len(x), CHUNK):
-            some = slice(start, start + CHUNK)
-            found[some] = self.shares(x[some], y[some], patch[some]) <= share
-        return found.reshape(self.heights.shape)
+        patch = np.repeat(np.arange(len(self.radii)), SIDE**2)
+        (shares,) = result_of(chunked(lambda *some: (self.shares(*some),), CHUNK, 1.0, x, y, patch))
+        return shares.reshape(self.heights.shape) <= share
 
     @cached_property
     def is_flat(self) -> NDArray[np.bool_]:

@@ -109,8 +109,7 @@ def _facing(charts: Charts, pairs: Pairs, up: Array) -> Array:
     is_flat = charts.is_flat[pairs.patch]
     apart, most = np.where(is_flat, FLAT_APART, APART), np.where(is_flat, FLAT_AGREE, AGREE)
     agree: Array = np.clip((cosine - apart) / (most - apart), 0.0, 1.0)
-    agree *= agree * (3.0 - 2.0 * agree)
-    return agree
+    return agree * (agree * (3.0 - 2.0 * agree))
 
 
 def _within(off: Array, band: Array) -> Array:
@@ -221,12 +220,10 @@ def argmin_per_point(place: NDArray[np.intp], key: NDArray[Any], count: int) -> 
 
     place : (m,), sorted
     """
-    found = np.full(count, -1)
-    if len(place):
-        starts = np.flatnonzero(np.diff(place, prepend=-1))
-        least = np.minimum.reduceat(key, starts)
-        those = np.flatnonzero(key == np.repeat(least, np.diff(starts, append=len(place))))
-        found[place[those[::-1]]] = those[::-1]  # The first of equal ones stays.
+    found, starts = np.full(count, -1), np.flatnonzero(np.diff(place, prepend=-1))
+    least = np.minimum.reduceat(key, starts)
+    those = np.flatnonzero(key == np.repeat(least, np.diff(starts, append=len(place))))[::-1]
+    found[place[those]] = those  # The first of equal ones stays.
     return found
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from ..contours.contour import Contour
 from ..reconstruction.result import Reconstruction
+from ..steps import chunked
 from ..triangles import normalized
 from .charts import AZIMUTHS, MARGIN, Charts, Pairs
 from .cubic_spline import SIDE, upsampled
@@ -50,19 +51,18 @@ def refit(
     earlier : number of contacts and table of each patch that was joined before; changed in place
     """
     points, normals, owner = _contacts(contours)
-    parts = []
-    for start in range(0, len(points), PLACES_AT_ONCE):
-        part = charts.pairs(points[start : start + PLACES_AT_ONCE])
-        parts.append(part._replace(point_index=start + part.point_index))
-        yield 0.0
+
+    def pairs_of(some: Array, indices: NDArray[np.intp]) -> Pairs:
+        """The pairs of some of the contacts, with the indices that these have among all."""
+        found = charts.pairs(some)
+        return found._replace(point_index=indices[found.point_index])
+
+    every = np.arange(len(points))
+    pairs = Pairs._make((yield from chunked(pairs_of, PLACES_AT_ONCE, 0.0, points, every)))
+    yield 0.0
     for order in ROUGHNESS:  # Otherwise the first spline would take ten times as long as the others.
         penalty(order)
         yield 0.0
-    columns = []
-    for values in zip(*parts, strict=True):
-        columns.append(np.concatenate(values))
-        yield 0.0
-    pairs = Pairs(*columns)
     each = np.argsort(pairs.patch, kind="stable")
     yield 0.0
     bounds = np.searchsorted(pairs.patch[each], np.arange(len(results) + 1))

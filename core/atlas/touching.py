@@ -143,21 +143,20 @@ class _Run:
         Where the point is on a crease or in a corner, a place near it makes a better patch.
         """
         p, n = vector_of(point), vector_of(up)
-        best, why = None, None
+        felt: list[tuple[Exploration, Vector, Vector]] = []
+        errors: list[ValueError] = []
         options = replace(self.options, farthest=FIRST_EXTENT * self.tolerance)
         for at, outward in self._places(p, n):
             (e,) = result_of(exploring_many(self.surface, [at], [outward], options))
             if isinstance(e, ValueError):
-                why = why or e
+                errors.append(e)
                 continue
-            if best is None or e.result.radius > best[0].result.radius:
-                best = e, at, outward
+            felt.append((e, at, outward))
             if e.result.radius >= GOOD * self.tolerance:
                 break
-        if best is None:
-            assert why is not None
-            raise why
-        first, at, outward = best
+        if not felt:
+            raise errors[0]
+        first, at, outward = max(felt, key=lambda each: each[0].result.radius)
         side = first_contact(self.surface, at, outward, tangent_of(outward, None), first.step)[2]
         self.frontier = Frontier(
             Finger(self.surface, side),
