@@ -94,7 +94,7 @@ class Charts:
             some = points[start : start + rows]
             low, high = some.min(axis=0, initial=np.inf), some.max(axis=0, initial=-np.inf)
             outside = self.origins - np.minimum(np.maximum(self.origins, low), high)
-            patch = np.flatnonzero(np.einsum("ni,ni->n", outside, outside) < reaches**2)
+            patch = np.flatnonzero(row_dot(outside, outside) < reaches**2)
             place, which = np.nonzero(cdist(some, self.origins[patch], "sqeuclidean") < reaches[patch] ** 2)
             yield start + place, patch[which]
 
@@ -187,19 +187,20 @@ class Charts:
         pitch = (2.0 * self.halves / (SIDE - 1))[patch]
         at = np.clip(np.array([x, y]) / pitch + 0.5 * (SIDE - 1), 0.0, SIDE - 1.0)
         first = np.minimum(at.astype(np.intp), SIDE - 2)
-        right, up = at - first
-        start, stds = (patch * SIDE + first[0]) * SIDE + first[1], self.stds.ravel()
-        left = stds.take(start) + up * (stds.take(start + 1) - stds.take(start))
-        start += SIDE
-        found: Array = stds.take(start) + up * (stds.take(start + 1) - stds.take(start))
-        return left + right * (found - left)
+        along_x, along_y = at - first
+        knot, stds = (patch * SIDE + first[0]) * SIDE + first[1], self.stds.ravel()
+        left, right = (
+            stds.take(start) + along_y * (stds.take(start + 1) - stds.take(start))
+            for start in (knot, knot + SIDE)
+        )
+        return left + along_x * (right - left)
 
     @cached_property
     def mean_stds(self) -> Array:
         """The mean deviation of the heights over each domain, (n,), a length."""
         inside = self.inside(1.0)
-        sums: Array = (self.stds * inside).sum(axis=(1, 2)) / np.maximum(inside.sum(axis=(1, 2)), 1)
-        return self.radii * sums
+        counts = np.maximum(inside.sum(axis=(1, 2)), 1)
+        return self.radii * ((self.stds * inside).sum(axis=(1, 2)) / counts)
 
     def inside(self, share: float) -> NDArray[np.bool_]:
         """Which knots are within this share of the domains' radii, (n, SIDE, SIDE)."""

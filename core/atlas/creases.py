@@ -110,7 +110,7 @@ def _intersections(
     for _ in range(NEWTON):
         up, felt = normals.copy(), np.zeros(len(places), dtype=bool)
         # Where no patch reaches, the sheet goes on as a plane.
-        distance = np.einsum("nki,nki->nk", points[:, None] - places, normals)
+        distance = row_dot(points[:, None] - places, normals)
         for i in range(count):
             sheet = sheet_facing(charts, points, normals[:, i], near)
             there = sheet.patch >= 0
@@ -121,13 +121,13 @@ def _intersections(
         points += np.where(met[:, None], steps, 0.0)
         met &= np.linalg.norm(points - middle, axis=1) < near
     if count == 3:  # Near a tip the sheets of patches merge, but the planes of the vertices still meet there.
-        distance = np.einsum("nki,nki->nk", middle[:, None] - places, normals)
+        distance = row_dot(middle[:, None] - places, normals)
         steps, apart = _least_norm_steps(normals, distance)
         tip = ~met & apart & (np.linalg.norm(steps, axis=1) < near)
         points, met, felt = np.where(tip[:, None], middle + steps, points), met | tip, felt & ~tip
     between = normalized(normals.sum(axis=1))
     pairs = charts.pairs(points, edge)
-    toward = np.einsum("mi,mi->m", pairs.normal, between[pairs.point_index])
+    toward = row_dot(pairs.normal, between[pairs.point_index])
     own = np.einsum("mi,mji->mj", pairs.normal, normals[pairs.point_index]).max(axis=1)
     rounded = (toward > own) & (pairs.rho < 1.0) & (np.abs(pairs.distance) > ROUND * edge)
     met[pairs.point_index[rounded]] = False

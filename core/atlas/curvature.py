@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..triangles import LEAST_DIVISOR, normalized, triangle_cross
+from ..triangles import LEAST_DIVISOR, normalized, row_dot, triangle_cross
 from .creases import SHARP
 from .meshing import Mesh
 from .tetrahedra import Indices, keyed_sides
@@ -77,9 +77,7 @@ def _ends(mesh: Mesh, normals: Array) -> Indices:
     across = normalized(triangle_cross(mesh.vertices[mesh.triangles]))
     opposite = np.roll(mesh.triangles, -2, axis=1).ravel()[pairs]  # The corners that are not on the side.
     is_end = np.ones(len(sides), dtype=bool)
-    is_end[pairs] = (np.einsum("ni,ni->n", *across[pairs // 3]) < SHARP) & (
-        np.einsum("ni,ni->n", *normals[opposite]) < TURNED
-    )
+    is_end[pairs] = (row_dot(*across[pairs // 3]) < SHARP) & (row_dot(*normals[opposite]) < TURNED)
     return sides[is_end]
 
 
@@ -117,7 +115,7 @@ def _neighborhoods(
     """
     off, ups = sheets.tree.data[at] - points[:, None], sheets.normals[at]
     alike = np.einsum("nki,ni->nk", ups, normals) > LEAST_COSINE
-    across = np.abs(np.einsum("nki,nki->nk", off, ups + normals[:, None]))
+    across = np.abs(row_dot(off, ups + normals[:, None]))
     x = normalized(np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)]))
     plane = np.stack([x, np.cross(normals, x)], axis=2)
     same = alike & (across <= ACROSS * distance)

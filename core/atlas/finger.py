@@ -40,7 +40,7 @@ class Finger(NamedTuple):
         down, height = scaled(normal, -1.0), min(s, LOW * radius)
         for start in (0.0, -0.5 * s):  # The patch may end a little beyond its surface.
             above = along(along(point, normal, height), t, start)
-            found = self._felt(self.surface.ray_cast(above, down, 2.0 * height), down)
+            found = self.met(above, down, 2.0 * height)
             if found is not None:
                 break
         else:
@@ -63,7 +63,7 @@ class Finger(NamedTuple):
         height = ABOVE * radius if roof is None else 0.5 * math.dist(point, roof[0])
         hits, middle, far = [(point, normal)], along(point, normal, height), height + ABOVE * radius
         for way in _disk_around(normal, tangent):
-            felt = self._felt(self.surface.ray_cast(along(middle, way, radius), down, far), down)
+            felt = self.met(along(middle, way, radius), down, far)
             if felt is not None and dot(felt[1], normal) > FACING:
                 hits.append(felt)
         return np.array(hits)
@@ -75,7 +75,7 @@ class Finger(NamedTuple):
     def near(self, point: Vector, normal: Vector, length: float) -> Contact | None:
         """The contact along a normal within a length of a point, if the surface there faces the same way."""
         down = scaled(normal, -1.0)
-        felt = self._felt(self.surface.ray_cast(along(point, normal, length), down, 2.0 * length), down)
+        felt = self.met(along(point, normal, length), down, 2.0 * length)
         return felt if felt is not None and dot(felt[1], normal) > SAME_SHEET_COSINE else None
 
     def _felt(self, hit: Hit | None, way: Vector) -> Contact | None:

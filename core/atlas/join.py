@@ -15,7 +15,7 @@ from ..arguments import Array
 from ..contours.contour import Contour
 from ..reconstruction.result import Reconstruction
 from ..steps import chunked
-from ..triangles import normalized
+from ..triangles import normalized, row_dot
 from .charts import AZIMUTHS, MARGIN, Charts, Pairs
 from .cubic_spline import SIDE, upsampled
 from .field import LAYER, sheet_facing
@@ -93,7 +93,7 @@ def _joined_table(
     likely = np.hypot(least, UNDOUBTED * r.mean_height_std / r.radius)
     likely = likely * (1.0 + LOOSER * np.maximum(some.rho - 1.0, 0.0))
     off = np.abs(some.distance) / (r.radius * likely)
-    facing = np.einsum("mi,mi->m", some.normal, normals[some.point_index]) > ALIGNED
+    facing = row_dot(some.normal, normals[some.point_index]) > ALIGNED
     on = own[some.point_index] | ((off < FARTHEST) & facing)
     place = some.point_index[on]
     local = (points[place] - r.frame.origin) @ r.frame.axes / r.radius
@@ -128,7 +128,7 @@ def _move(charts: Charts, patch: NDArray[np.intp], x: Array, y: Array) -> Array:
     """How far patches (k,) have to move above local (x, y), in unit radius, to lie on the blend."""
     points, normals = charts.world(patch, x, y)
     field = sheet_facing(charts, points, normals, LAYER * charts.radii[patch])
-    up = np.einsum("ki,ki->k", field.normal, charts.axes[patch, :, 2])
+    up = row_dot(field.normal, charts.axes[patch, :, 2])
     move = -field.distance / np.maximum(up, FACING) / charts.radii[patch]
     on = (field.patch >= 0) & (up > FACING) & (np.abs(move) < MOVED)
     return np.where(on, move, 0.0)

@@ -15,6 +15,7 @@ from ..reconstruction.from_contours import reconstruct_many
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.start import TOUCH_ROUNDING, too_coarse
 from ..steps import part_of, result_of
+from ..triangles import row_dot
 from .charts import AZIMUTHS, Charts
 from .finger import FACING
 from .join import stacked, tabulate
@@ -163,7 +164,7 @@ def _require_one_side(points: Array, normals: Array) -> None:
     chords, others = points[near] - points[:, None], normals[near]
     facing = np.einsum("nki,ni->nk", others, normals)
     sums = normals[:, None] + np.copysign(1.0, facing)[..., None] * others
-    apart = np.abs(np.einsum("nki,nki->nk", chords, sums))
+    apart = np.abs(row_dot(chords, sums))
     usual = np.median(apart[facing > FACING]) if (facing > FACING).any() else 0.0
     wrong = (facing < -FACING) & (apart <= SAME_PLACE * usual)
     if wrong.mean() > OPPOSITE:
@@ -179,7 +180,7 @@ def _beyond_bend(centers: Array, contacts: Array, links: NDArray[np.intp]) -> tu
     There kappa_center < -1 / r, and contacts (n, 3) lie the other way around than their centers.
     """
     ways, below = (points[links] - points[:, None] for points in (centers, contacts))
-    turned = np.einsum("nki,nki->nk", ways, below) < -TURNED * np.einsum("nki,nki->nk", ways, ways)
+    turned = row_dot(ways, below) < -TURNED * row_dot(ways, ways)
     beyond = turned.mean(axis=1) > TURNED
     if beyond.mean() <= TURNED:
         return None
@@ -197,7 +198,7 @@ def _off_contacts(atlas: Atlas, contacts: MeasuredContacts, noise: float) -> tup
     _, triangle, *_ = atlas.reference.feet(points)
     explained = OFF_STDS * np.hypot(np.where(np.isfinite(std), std, 0.0), noise)
     off = np.abs(distance) > np.maximum(explained, OFF_CELLS * atlas.reference.indicator.cell)
-    off |= np.einsum("ni,ni->n", atlas.reference.normals[triangle], normals) < 0.0
+    off |= row_dot(atlas.reference.normals[triangle], normals) < 0.0
     if off.mean() <= OFF:
         return None
     return "uncertain", (

@@ -189,12 +189,12 @@ def meshed(
         yield 0.7
         vertices, surface = yield from _project_and_smooth(charts, indicator, vertices, up, triangles, band)
     yield 0.9
-    every = np.arange(len(vertices))
+    old = np.arange(len(vertices))
     vertices, triangles, parents, unfelt = yield from insert_creases(
         charts, vertices, triangles, surface.normal, edge
     )
     yield 0.9
-    surface = surface.chosen(np.append(every, parents))
+    surface = SurfaceSample._make(values[np.append(old, parents)] for values in surface)
     surface = surface._replace(std=np.hypot(surface.std, CONTINUED_STD * unfelt))
     return (yield from _trim_unfelt(vertices, triangles, surface, indicator, ended, contacts))
 

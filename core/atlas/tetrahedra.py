@@ -66,8 +66,7 @@ def march(tetrahedra: Indices, values: Array) -> tuple[Indices, Indices]:
     mixed = signs.any(axis=1) & ~signs.all(axis=1)
     tetrahedra, signs = tetrahedra[mixed], signs[mixed]
     case = signs @ (1 << np.arange(4))
-    table = _table()
-    corners = [tetrahedra[case == code][:, table[code]].reshape(-1, 2) for code in range(1, 15)]
+    corners = [tetrahedra[case == code][:, ends].reshape(-1, 2) for code, ends in _table().items()]
     ends = np.concatenate(corners)
     keys = ends.min(axis=1) * len(values) + ends.max(axis=1)
     distinct = _different(keys)
@@ -136,8 +135,7 @@ def sides_of(triangles: Indices, count: int) -> Indices:
 def subdivided(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
     """Vertices (n, 3) and triangles (m, 3) with a vertex more in the middle of each edge."""
     sides = sides_of(triangles, len(vertices))
-    middles = vertices[sides].mean(axis=1)
-    return np.vstack([vertices, middles]), split_sides(triangles, sides, len(vertices))
+    return np.vstack([vertices, vertices[sides].mean(axis=1)]), split_sides(triangles, sides, len(vertices))
 
 
 def connected_pieces(i: Indices, j: Indices, count: int) -> tuple[int, Indices]:

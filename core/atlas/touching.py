@@ -18,6 +18,7 @@ from ..exploration.one_touch import Exploration
 from ..exploration.options import ExplorationOptions
 from ..exploration.side_by_side import exploring_many
 from ..steps import part_of, result_of
+from ..triangles import row_dot
 from .borders import felt_border, snapped_to_border
 from .charts import Charts
 from .finger import FACING, Finger
@@ -318,11 +319,11 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
     aims[: CHECKS // 2] = centers[aimed]
     ways = (aims - middle - away)[: CHECKS // 2]
     # The triangle's own normal counts: that of a vertex on a crease is between those of its sheets.
-    ahead = np.einsum("ni,ni->n", reference.normals[aimed], ways)
+    ahead = row_dot(reference.normals[aimed], ways)
     facing = ahead < -STRAIGHT * np.linalg.norm(ways, axis=1)
     sharpest = np.argsort(np.where(reference.is_open, np.inf, reference.angles), kind="stable")[:SHARPEST]
     up = away[: len(sharpest)]
-    up = up * np.copysign(1.0, np.einsum("ni,ni->n", up, mesh.normals[sharpest]))[:, None]
+    up = up * np.copysign(1.0, row_dot(up, mesh.normals[sharpest]))[:, None]
     around = np.unique(reference.fans[sharpest[:SPIKES]])
     around = around[np.linalg.norm(reference.normals[around], axis=1) > STRAIGHT]  # The others have no area.
     down = far * reference.normals[around]
