@@ -149,8 +149,8 @@ class Charts:
         foot_x, foot_y = x + off * hx, y + off * hy
         rho = self.shares(foot_x, foot_y, patch)
         # The foot of a place on a slope is nearer than the surface below it.
-        inside = (rho < margin) & (np.abs(off) * np.sqrt(1.0 + hx**2 + hy**2) < reach[patch])
-        which = np.flatnonzero(inside)
+        near = np.abs(off) * np.sqrt(1.0 + hx**2 + hy**2) < reach[patch]
+        which = np.flatnonzero((rho < margin) & near)
         place, patch, rho = place[which], patch[which], rho[which]
         x, y, z, foot_x, foot_y = np.array([x, y, z, foot_x, foot_y])[:, which]
         h, hx, hy = self._heights(foot_x, foot_y, patch)
@@ -171,8 +171,7 @@ class Charts:
         pitch = (2.0 * self.halves / (SIDE - 1))[patch]
         (column, row), weights, slopes = bspline_weights(np.array([x, y]) / pitch)
         start, steps = (patch * SIDE + column - 1) * SIDE + row - 1, np.arange(CUBIC + 1)
-        knots = start + (steps[:, None] * SIDE + steps)[:, :, None]
-        taps = self.heights.ravel().take(knots)
+        taps = self.heights.ravel().take(start + (steps[:, None] * SIDE + steps)[:, :, None])
         across, across_slopes = (np.einsum("ijm,jm->im", taps, by[:, 1]) for by in (weights, slopes))
         return np.array(
             [
@@ -227,10 +226,6 @@ class Charts:
         found = replace(self, stds=factor * self.stds)
         vars(found)["is_flat"] = self.is_flat  # where cached_property looks: it does not depend on these
         return found
-
-    def chosen(self, which: NDArray[Any]) -> "Charts":
-        """The tables of some of the patches."""
-        return Charts(*(getattr(self, f.name)[which] for f in fields(Charts)))
 
     def joined(self, others: "Charts") -> "Charts":
         """The tables of these patches, followed by others."""

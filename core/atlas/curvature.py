@@ -118,8 +118,8 @@ def _neighborhoods(
     across = np.abs(row_dot(off, ups + normals[:, None]))
     x = normalized(np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)]))
     plane = np.stack([x, np.cross(normals, x)], axis=2)
-    same = alike & (across <= ACROSS * distance)
-    return np.where(same, distance, np.inf), np.concatenate([off @ plane, ups @ plane], axis=2)
+    distance = np.where(alike & (across <= ACROSS * distance), distance, np.inf)
+    return distance, np.concatenate([off @ plane, ups @ plane], axis=2)
 
 
 def vertices_shown(

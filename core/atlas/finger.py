@@ -38,12 +38,10 @@ class Finger(NamedTuple):
         radius : that of the patch on whose rim the point lies
         """
         down, height = scaled(normal, -1.0), min(s, LOW * radius)
-        for start in (0.0, -0.5 * s):  # The patch may end a little beyond its surface.
-            above = along(along(point, normal, height), t, start)
-            found = self.met(above, down, 2.0 * height)
-            if found is not None:
-                break
-        else:
+        # The patch may end a little beyond its surface.
+        above = (along(along(point, normal, height), t, start) for start in (0.0, -0.5 * s))
+        found = next(filter(None, (self.met(p, down, 2.0 * height) for p in above)), None)
+        if found is None:
             return None
         at = along(found[0], normal, HAIR * radius)
         for way, length in ((t, s), (down, 1.5 * s), (scaled(t, -1.0), 2.5 * s), (normal, 1.5 * s)):

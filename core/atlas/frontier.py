@@ -136,8 +136,7 @@ class Frontier:
 
     def tried(self, touch: Next) -> None:
         """Queues the place of a touch again after the touch was made: something may be left beyond it."""
-        tried = *touch.place.tried, vector_of(touch.point)
-        self.push(replace(touch.place, tried=tried), touch.gain)
+        self.push(replace(touch.place, tried=(*touch.place.tried, vector_of(touch.point))), touch.gain)
 
     def next_touches(self, count: int) -> Generator[None, None, list[Next]]:
         """At most `count` touches, far apart, that bring most. Yields each time before it looks at places."""

@@ -98,8 +98,7 @@ def _joined_table(
     place = some.point_index[on]
     local = (points[place] - r.frame.origin) @ r.frame.axes / r.radius
     weights = 1.0 / np.maximum(off[on], 1.0) ** 2
-    found = smoothing_spline(local, normals[place] @ r.frame.axes, weights, half, least)
-    return rim, half, *found
+    return rim, half, *smoothing_spline(local, normals[place] @ r.frame.axes, weights, half, least)
 
 
 def blend_heights(charts: Charts) -> Joining:

@@ -128,8 +128,7 @@ class ReferenceMesh:
         if not self.is_open.any():
             return np.zeros(len(points), dtype=bool)
         feet, _, _, ends = self.feet(points)
-        off: NDArray[np.bool_] = np.linalg.norm(points - feet, axis=1) > self.edge
-        return off | ends
+        return ends | (np.linalg.norm(points - feet, axis=1) > self.edge)
 
     def away(self, point: Vector) -> float:
         """The distance of a point from the triangles."""

@@ -278,8 +278,9 @@ class _Run:
         yield 1.0
         uncovered = yield from self.frontier.uncovered(reference)
         places, taps = tuple(place for place, _ in uncovered), tuple(self.frontier.taps)
-        cut_short = self.done >= self.most
-        atlas = Atlas(patches, charts, reference, self.tolerance, places, check, taps, border, cut_short)
+        atlas = Atlas(
+            patches, charts, reference, self.tolerance, places, check, taps, border, self.done >= self.most
+        )
         off = atlas.improvable
         yield 1.0
         atlas = yield from atlas.widened()

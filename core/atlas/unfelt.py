@@ -23,9 +23,10 @@ def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[RimPlace
     """
     from scipy.spatial import cKDTree
 
+    found: list[RimPlace] = []
     mesh, unfelt = reference.mesh, reference.unfelt
     if unfelt is None or not reference.is_open.any():
-        return ()
+        return tuple(found)
     rim, patch = mesh.vertices[reference.is_open], mesh.patch[reference.is_open]
     known, missing = np.flatnonzero(mesh.patch >= 0), patch < 0
     nearest = cKDTree(mesh.vertices[known] if len(known) else charts.origins).query(rim[missing])[1]
@@ -34,7 +35,7 @@ def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[RimPlace
     radii, areas = charts.radii[patch], _areas(unfelt)
     around = cKDTree(unfelt.vertices).query_ball_point(rim, radii)
     gains = np.minimum([areas[some].sum() for some in around], np.pi * radii**2)
-    left, found = np.arange(len(rim)), []
+    left = np.arange(len(rim))
     while len(left):
         best = left[np.argmax(gains[left])]
         point, up = rim[best], ups[best]
