@@ -126,8 +126,7 @@ class Frontier:
         contacts = [self.finger.near(vector_of(p), vector_of(n), self.near) for p, n in places]
         felt = np.array([contact for contact in contacts if contact is not None])
         points, normals = felt.reshape(-1, 2, 3).transpose(1, 0, 2)
-        offsets = self.rng.normal(0.0, self.noise, len(points))
-        return Contour(points + offsets[:, None] * normals, normals=normals)
+        return Contour(points + self.rng.normal(0.0, self.noise, (len(points), 1)) * normals, normals=normals)
 
     def push(self, place: RimPlace, gain: float) -> None:
         """Queues a place by the area that a touch there may bring."""

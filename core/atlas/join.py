@@ -129,8 +129,7 @@ def _move(charts: Charts, patch: NDArray[np.intp], x: Array, y: Array) -> Array:
     field = sheet_facing(charts, points, normals, LAYER * charts.radii[patch])
     up = row_dot(field.normal, charts.axes[patch, :, 2])
     move = -field.distance / np.maximum(up, FACING) / charts.radii[patch]
-    on = (field.patch >= 0) & (up > FACING) & (np.abs(move) < MOVED)
-    return np.where(on, move, 0.0)
+    return np.where((field.patch >= 0) & (up > FACING) & (np.abs(move) < MOVED), move, 0.0)
 
 
 def _contacts(contours: Sequence[list[Contour]]) -> tuple[Array, Array, NDArray[np.intp]]:
@@ -183,6 +182,5 @@ def _half(rim: Array) -> float:
 
 def _stds(r: Reconstruction, x: Array, y: Array) -> Array:
     """Deviations (SIDE, SIDE), computed at every other knot, because they are smooth and cost the most."""
-    coarse = slice(None, None, 2)
-    x, y = x.reshape(SIDE, SIDE)[coarse, coarse], y.reshape(SIDE, SIDE)[coarse, coarse]
+    x, y = (each.reshape(SIDE, SIDE)[::2, ::2] for each in (x, y))
     return upsampled(r.height_std(x.ravel(), y.ravel()).reshape(x.shape) / r.radius)

@@ -86,8 +86,7 @@ def cover_contacts(
     noise = None if noise is None else number("noise", noise, least=0.0)
     contacts, noise, doubt = _contacts(contours_or_strokes, outward, noise)
     yield 0.0
-    cloud = _Cloud(contacts, cKDTree(contacts.points), noise, largest)
-    found, charts = yield from _patches(cloud)
+    found, charts = yield from _patches(_Cloud(contacts, cKDTree(contacts.points), noise, largest))
     reference = yield from part_of(joined_surface(found, charts, largest, contacts), 1.0, 1.0)
     places = uncovered_places(reference, charts)
     atlas = Atlas(tuple(found), charts, reference, largest, places, contacts=contacts)
@@ -328,8 +327,7 @@ def _patches(cloud: _Cloud) -> Generator[float, None, tuple[list[Reconstruction]
         if not left[i]:
             continue
         r, last = cloud.largest_patch(i, radii, last)
-        some = cloud.same_sheet(i, MISSING * radius)
-        left[some] = False
+        left[cloud.same_sheet(i, MISSING * radius)] = False
         if r is not None:
             found.append(r)
             tables.append(tabulate(r, cloud.rim(i, r), deviations=True))

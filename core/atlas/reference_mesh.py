@@ -58,10 +58,8 @@ class ReferenceMesh:
     def fans(self) -> Indices:
         """The triangles at each vertex, (n, most); the first one again where there are fewer."""
         corners = self.mesh.triangles.ravel()
-        order, counts = (
-            np.argsort(corners, kind="stable"),
-            np.bincount(corners, minlength=len(self.mesh.vertices)),
-        )
+        order = np.argsort(corners, kind="stable")
+        counts = np.bincount(corners, minlength=len(self.mesh.vertices))
         start, steps = np.cumsum(counts) - counts, np.arange(counts.max())
         return order[start[:, None] + np.where(steps < counts[:, None], steps, 0)] // 3
 

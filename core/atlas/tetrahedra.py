@@ -81,8 +81,6 @@ def _table() -> dict[int, Indices]:
     A vertex lies on an edge, which is a pair of corners: (3 k, 2), three rows a triangle.
     """
     place = np.array([(-1, -1, -1), (1, -1, -1), (0, 1, -1), (0, 0, 1)], dtype=float)
-    if np.linalg.det(place[1:] - place[0]) < 0.0:
-        place[[0, 1]] = place[[1, 0]]
     found = {}
     for code in range(1, 15):
         ins = [i for i in range(4) if code >> i & 1]
@@ -106,8 +104,7 @@ def smoothed(vertices: Array, normal: Array, triangles: Indices) -> Array:
     from scipy.sparse import coo_matrix
 
     a, b = triangles[:, [0, 1, 2]].ravel(), triangles[:, [1, 2, 0]].ravel()
-    n = len(vertices)
-    links = coo_matrix((np.ones(len(a)), (a, b)), (n, n)).tocsr()
+    links = coo_matrix((np.ones(len(a)), (a, b)), (len(vertices),) * 2).tocsr()
     border = np.asarray((abs(links - links.T)).sum(axis=1)).ravel() > 0.0
     links = links + links.T
     counts = np.asarray(links.sum(axis=1)).ravel()
