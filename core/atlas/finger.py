@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arguments import Array
 from ..contours.contour import Vector, along, cross, dot, scaled, tangent_of
-from ..contours.finger import SAME_SHEET_COSINE, Contact, Hit, Surface, contact_of
+from ..contours.finger import SAME_SHEET_COSINE, Contact, Hit, Surface, contact_of, first_contact
 
 # python -m benchmarks.atlas judges these.
 DISK_PLACES = 36  # A disk around a contact is felt at this number of places.
@@ -80,6 +80,14 @@ class Finger(NamedTuple):
         """The contact where a ray in this direction has hit, or None if it came from inside the object."""
         found = None if hit is None else contact_of(hit, self.side)
         return None if found is None or dot(found[1], way) >= 0.0 else found
+
+
+def finger_at(surface: Surface, point: Vector, outward: Vector, step: float) -> Finger:
+    """The finger on the outer side of a surface at a point of it, which is felt from a tenth of a step above.
+
+    Raises ValueError if no surface is there.
+    """
+    return Finger(surface, first_contact(surface, point, outward, tangent_of(outward, None), step)[2])
 
 
 def _disk_around(normal: Vector, tangent: Vector) -> list[Vector]:

@@ -161,7 +161,10 @@ def stacked(results: Sequence[Reconstruction], tables: Sequence[Table]) -> Chart
 
 
 def tabulate(r: Reconstruction, rim: Array, deviations: bool) -> Table:
-    """The table of a patch with this rim (AZIMUTHS,), in unit radius, fitted only to its own contacts."""
+    """The table of a patch with this rim (AZIMUTHS,), in unit radius, fitted only to its own contacts.
+
+    deviations : whether they are computed; otherwise they are 0
+    """
     from scipy.ndimage import spline_filter
 
     half = _half(rim)

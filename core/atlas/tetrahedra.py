@@ -37,6 +37,8 @@ def _different(numbers: Indices) -> Indices:
 def tetrahedra_of(cells: Indices) -> Generator[float, None, tuple[Indices, Indices]]:
     """Lattice points (n, 3), in halves of a cube, and tetrahedra (m, 4) on all faces between two cubes.
 
+    cells : (k, 3), the lowest corners of the cubes, in cubes
+
     Yields 0 between its parts.
     """
     low = 2 * cells.min(axis=0)
@@ -61,7 +63,11 @@ def tetrahedra_of(cells: Indices) -> Generator[float, None, tuple[Indices, Indic
 
 
 def march(tetrahedra: Indices, values: Array) -> tuple[Indices, Indices]:
-    """Lattice edges (n, 2) that the surface crosses, and its triangles (m, 3) between these crossings."""
+    """Lattice edges (n, 2) that the surface crosses, and its triangles (m, 3) between these crossings.
+
+    tetrahedra : (k, 4), lattice points
+    values : at all lattice points, negative inside
+    """
     signs = (values < 0.0)[tetrahedra]
     mixed = signs.any(axis=1) & ~signs.all(axis=1)
     tetrahedra, signs = tetrahedra[mixed], signs[mixed]
@@ -100,7 +106,10 @@ def _table() -> dict[int, Indices]:
 
 
 def smoothed(vertices: Array, normal: Array, triangles: Indices) -> Array:
-    """Vertices moved along the surface, towards the mean of their neighbors; those of a border stay."""
+    """Vertices (n, 3) moved towards the mean of their neighbors, across their unit normals (n, 3).
+
+    Those on the border of the triangles (m, 3) stay.
+    """
     from scipy.sparse import coo_matrix
 
     a, b = triangles[:, [0, 1, 2]].ravel(), triangles[:, [1, 2, 0]].ravel()

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, number, unit_vector
 from ..contours.contour import Vector, along, cross, dot, scaled, tangent_of, vector_of
-from ..contours.finger import Surface, contact_of, first_contact
+from ..contours.finger import Surface, contact_of
 from ..contours.tracking import generator_of
 from ..exploration.one_touch import Exploration
 from ..exploration.options import ExplorationOptions
@@ -21,7 +21,7 @@ from ..steps import part_of, result_of
 from ..triangles import row_dot
 from .borders import felt_border, snapped_to_border
 from .charts import Charts
-from .finger import FACING, Finger
+from .finger import FACING, finger_at
 from .frontier import Frontier
 from .join import Table, blend_heights, refit
 from .meshing import Mesh
@@ -158,9 +158,8 @@ class _Run:
         if not felt:
             raise errors[0]
         first, at, outward = max(felt, key=lambda each: each[0].result.radius)
-        side = first_contact(self.surface, at, outward, tangent_of(outward, None), first.step)[2]
         self.frontier = Frontier(
-            Finger(self.surface, side),
+            finger_at(self.surface, at, outward, first.step),
             NEAR * self.tolerance,
             np.pi * (SMALL * self.tolerance) ** 2,
             self.options.noise,
