@@ -242,7 +242,7 @@ class Atlas:
     @property
     def contradicting(self) -> NDArray[np.bool_]:
         """Which contacts of the check (n,) are farther from the surface than is explained."""
-        stds = self._contacts[1]
+        _, stds = self._contacts
         return self._farther(np.maximum(OFF_STDS * stds, OFF_TOLERANCES * (self.tolerance or 0.0)))
 
     @property
