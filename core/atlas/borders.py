@@ -84,7 +84,11 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
 def _above(
     near: Callable[..., Contact | None], normals: Array, points: Array, which: Indices
 ) -> Generator[float, None, Array]:
-    """How far the surface is above points (k, 3) along those (k,) of normals (n, 3); NaN where it is not."""
+    """How far the surface is above points (k, 3) next to places, (k,); NaN where it is not.
+
+    normals : (n, 3), the normals at the places
+    which : (k,), the place next to each point
+    """
     contacts = yield from _contacts(near, points, normals[which])
     feet = np.array([np.full(3, np.nan) if contact is None else contact[0] for contact in contacts])
     return row_dot(feet.reshape(-1, 3) - points, normals[which])

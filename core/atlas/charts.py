@@ -198,8 +198,8 @@ class Charts:
     def mean_stds(self) -> Array:
         """The mean deviation of the heights over each domain, (n,), a length."""
         inside = self.inside(1.0)
-        counts = np.maximum(inside.sum(axis=(1, 2)), 1)
-        return self.radii * ((self.stds * inside).sum(axis=(1, 2)) / counts)
+        means: Array = (self.stds * inside).sum(axis=(1, 2)) / np.maximum(inside.sum(axis=(1, 2)), 1)
+        return self.radii * means
 
     def inside(self, share: float) -> NDArray[np.bool_]:
         """Which knots are within this share of the domains' radii, (n, SIDE, SIDE)."""

@@ -59,7 +59,6 @@ def refit(
 
     every = np.arange(len(points))
     pairs = Pairs._make((yield from chunked(pairs_of, PLACES_AT_ONCE, 0.0, points, every)))
-    yield 0.0
     for order in ROUGHNESS:  # Otherwise the first spline would take ten times as long as the others.
         penalty(order)
         yield 0.0
