@@ -35,10 +35,13 @@ def chunked(
 ) -> Generator[float, None, tuple[Any, ...]]:
     """The arrays that a function returns for arrays of n rows, computed for `size` rows at a time.
 
-    Yields `share` after each chunk. The function is called once if there are no rows.
+    Yields `share` after each chunk and each array. The function is called once if there are no rows.
     """
-    parts = []
+    parts, found = [], []
     for start in range(0, max(len(arrays[0]), 1), size):
         parts.append(function(*(array[start : start + size] for array in arrays)))
         yield share
-    return tuple(np.concatenate(values) for values in zip(*parts, strict=True))
+    for values in zip(*parts, strict=True):
+        found.append(np.concatenate(values))
+        yield share
+    return tuple(found)

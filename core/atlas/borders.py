@@ -59,11 +59,7 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
     at, before, after, ways, normals = _rim_of(mesh)
     yield 0.0
     places = mesh.vertices[at]
-
-    def off(points: Array, which: Indices) -> Generator[float, None, Array]:
-        """How far the surface is above points (k, 3) near some of the places, (k,)."""
-        return _above(partial(finger.near, length=near), points, normals[which])
-
+    off = partial(_above, partial(finger.near, length=near), normals)
     lengths, ended = yield from _lengths(off, places, ways, STEP * mesh.edge)
     places = places + lengths[:, None] * ways
     places += np.nan_to_num((yield from off(places, np.arange(len(at)))))[:, None] * normals
@@ -86,12 +82,16 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
 
 
 def _above(
-    near: Callable[..., Contact | None], points: Array, normals: Array
+    near: Callable[..., Contact | None], normals: Array, points: Array, which: Indices
 ) -> Generator[float, None, Array]:
-    """How far the surface is above points (k, 3) along normals (k, 3), (k,); NaN where it is not."""
-    contacts = yield from _contacts(near, points, normals)
+    """How far the surface is above points (k, 3) next to places, (k,); NaN where it is not.
+
+    normals : (n, 3), the normals at the places
+    which : (k,), the place next to each point
+    """
+    contacts = yield from _contacts(near, points, normals[which])
     feet = np.array([np.full(3, np.nan) if contact is None else contact[0] for contact in contacts])
-    return row_dot(feet.reshape(-1, 3) - points, normals)
+    return row_dot(feet.reshape(-1, 3) - points, normals[which])
 
 
 def _contacts(

@@ -62,16 +62,13 @@ def edges_of(charts: Charts) -> Generator[float, None, list[Edge]]:
         parts.append(_crossings(charts, node))
         yield 0.9 * (node + 1) / count
     nodes, others, rays, points, angles = (np.concatenate(values) for values in zip(*parts, strict=True))
-    pairs: dict[tuple[int, int], list[int]] = {}
-    for i, pair in enumerate(zip(nodes.tolist(), others.tolist(), strict=True)):
-        pairs.setdefault(pair, []).append(i)
     edges = []
-    for pair in sorted({(min(p), max(p)) for p in pairs}):
-        which = max(pairs.get(pair, []), pairs.get(pair[::-1], []), key=len)
+    for a, b in np.unique(np.sort(np.stack([nodes, others], axis=1), axis=1), axis=0).tolist():
+        which = max((np.flatnonzero((nodes == p) & (others == q)) for p, q in ((a, b), (b, a))), key=len)
         # In the order of their rays, beginning after the widest gap between two.
         gaps = np.diff(rays[which], append=rays[which[0]] + RAYS)
         turned = np.roll(which, -1 - int(np.argmax(gaps)))
-        edges.append(Edge(pair, points[turned], angles[turned]))
+        edges.append(Edge((a, b), points[turned], angles[turned]))
         yield 1.0
     return edges
 
@@ -93,8 +90,7 @@ def _crossings(
     turns = 2.0 * np.pi * np.arange(RAYS) / RAYS
     out = MARGIN * np.arange(1, RAY_PLACES + 1) / (RAY_PLACES + 1)
     rays = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-    each = np.full(RAYS, node)
-    unit = 1.0 / np.maximum(charts.shares(rays[:, 0], rays[:, 1], each), 1e-9)
+    unit = 1.0 / np.maximum(charts.shares(rays[:, 0], rays[:, 1], np.full(RAYS, node)), 1e-9)
     xy = (rays * unit[:, None])[:, None] * out[:, None]
     points, normals = charts.world(np.full(RAYS * RAY_PLACES, node), *xy.reshape(-1, 2).T)
     pairs = charts.pairs(points)

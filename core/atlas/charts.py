@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..steps import chunked, result_of
 from ..triangles import normalized, row_dot
 from .cubic_spline import CUBIC, SIDE, bspline_weights, cubics
 
@@ -93,7 +94,7 @@ class Charts:
             some = points[start : start + rows]
             low, high = some.min(axis=0, initial=np.inf), some.max(axis=0, initial=-np.inf)
             outside = self.origins - np.minimum(np.maximum(self.origins, low), high)
-            patch = np.flatnonzero(np.einsum("ni,ni->n", outside, outside) < reaches**2)
+            patch = np.flatnonzero(row_dot(outside, outside) < reaches**2)
             place, which = np.nonzero(cdist(some, self.origins[patch], "sqeuclidean") < reaches[patch] ** 2)
             yield start + place, patch[which]
 
@@ -148,8 +149,8 @@ class Charts:
         foot_x, foot_y = x + off * hx, y + off * hy
         rho = self.shares(foot_x, foot_y, patch)
         # The foot of a place on a slope is nearer than the surface below it.
-        inside = (rho < margin) & (np.abs(off) * np.sqrt(1.0 + hx**2 + hy**2) < reach[patch])
-        which = np.flatnonzero(inside)
+        near = np.abs(off) * np.sqrt(1.0 + hx**2 + hy**2) < reach[patch]
+        which = np.flatnonzero((rho < margin) & near)
         place, patch, rho = place[which], patch[which], rho[which]
         x, y, z, foot_x, foot_y = np.array([x, y, z, foot_x, foot_y])[:, which]
         h, hx, hy = self._heights(foot_x, foot_y, patch)
@@ -170,8 +171,7 @@ class Charts:
         pitch = (2.0 * self.halves / (SIDE - 1))[patch]
         (column, row), weights, slopes = bspline_weights(np.array([x, y]) / pitch)
         start, steps = (patch * SIDE + column - 1) * SIDE + row - 1, np.arange(CUBIC + 1)
-        knots = start + (steps[:, None] * SIDE + steps)[:, :, None]
-        taps = self.heights.ravel().take(knots)
+        taps = self.heights.ravel().take(start + (steps[:, None] * SIDE + steps)[:, :, None])
         across, across_slopes = (np.einsum("ijm,jm->im", taps, by[:, 1]) for by in (weights, slopes))
         return np.array(
             [
@@ -186,28 +186,27 @@ class Charts:
         pitch = (2.0 * self.halves / (SIDE - 1))[patch]
         at = np.clip(np.array([x, y]) / pitch + 0.5 * (SIDE - 1), 0.0, SIDE - 1.0)
         first = np.minimum(at.astype(np.intp), SIDE - 2)
-        right, up = at - first
-        start, stds = (patch * SIDE + first[0]) * SIDE + first[1], self.stds.ravel()
-        left = stds.take(start) + up * (stds.take(start + 1) - stds.take(start))
-        start += SIDE
-        found: Array = stds.take(start) + up * (stds.take(start + 1) - stds.take(start))
-        return left + right * (found - left)
+        along_x, along_y = at - first
+        knot, stds = (patch * SIDE + first[0]) * SIDE + first[1], self.stds.ravel()
+        left, right = (
+            stds.take(start) + along_y * (stds.take(start + 1) - stds.take(start))
+            for start in (knot, knot + SIDE)
+        )
+        return left + along_x * (right - left)
 
     @cached_property
     def mean_stds(self) -> Array:
         """The mean deviation of the heights over each domain, (n,), a length."""
         inside = self.inside(1.0)
-        sums: Array = (self.stds * inside).sum(axis=(1, 2)) / np.maximum(inside.sum(axis=(1, 2)), 1)
-        return self.radii * sums
+        means: Array = (self.stds * inside).sum(axis=(1, 2)) / np.maximum(inside.sum(axis=(1, 2)), 1)
+        return self.radii * means
 
     def inside(self, share: float) -> NDArray[np.bool_]:
         """Which knots are within this share of the domains' radii, (n, SIDE, SIDE)."""
         x, y = self.knots().reshape(2, -1)
-        patch, found = np.repeat(np.arange(len(self.radii)), SIDE**2), np.zeros(len(x), dtype=bool)
-        for start in range(0, len(x), CHUNK):
-            some = slice(start, start + CHUNK)
-            found[some] = self.shares(x[some], y[some], patch[some]) <= share
-        return found.reshape(self.heights.shape)
+        patch = np.repeat(np.arange(len(self.radii)), SIDE**2)
+        (shares,) = result_of(chunked(lambda *some: (self.shares(*some),), CHUNK, 1.0, x, y, patch))
+        return shares.reshape(self.heights.shape) <= share
 
     @cached_property
     def is_flat(self) -> NDArray[np.bool_]:
@@ -227,10 +226,6 @@ class Charts:
         found = replace(self, stds=factor * self.stds)
         vars(found)["is_flat"] = self.is_flat  # where cached_property looks: it does not depend on these
         return found
-
-    def chosen(self, which: NDArray[Any]) -> "Charts":
-        """The tables of some of the patches."""
-        return Charts(*(getattr(self, f.name)[which] for f in fields(Charts)))
 
     def joined(self, others: "Charts") -> "Charts":
         """The tables of these patches, followed by others."""

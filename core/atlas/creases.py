@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..steps import chunked
-from ..triangles import normalized
+from ..triangles import normalized, row_dot
 from .charts import Charts
 from .field import sheet_facing
 from .tetrahedra import Indices, sides_of, split_sides
@@ -43,14 +43,11 @@ def insert_creases(
     vertices, free, unfelt = vertices.copy(), np.ones(len(vertices), dtype=bool), np.zeros(len(vertices))
     sides = sides_of(triangles, len(vertices))
     yield 0.9
-    sharp = np.einsum("ni,ni->n", normals[sides[:, 0]], normals[sides[:, 1]]) < SHARP
-    sides = sides[sharp]
-    at_crease = np.zeros(len(vertices), dtype=bool)
-    at_crease[sides] = True
+    sides = sides[row_dot(normals[sides[:, 0]], normals[sides[:, 1]]) < SHARP]
+    at_crease = np.bincount(sides.ravel(), minlength=len(vertices)) > 0
     some = triangles[at_crease[triangles].all(axis=1)]
     a, b, c = normals[some].transpose(1, 0, 2)
-    turned = [np.einsum("ni,ni->n", u, v) < SHARP for u, v in ((a, b), (b, c), (c, a))]
-    some = some[np.all(turned, axis=0)]
+    some = some[np.all([row_dot(u, v) < SHARP for u, v in ((a, b), (b, c), (c, a))], axis=0)]
     for corner, beyond, at in _corners(charts, vertices, normals, some, edge):
         vertices[at], unfelt[at], free[at] = corner, beyond, False
     yield 0.9
@@ -113,7 +110,7 @@ def _intersections(
     for _ in range(NEWTON):
         up, felt = normals.copy(), np.zeros(len(places), dtype=bool)
         # Where no patch reaches, the sheet goes on as a plane.
-        distance = np.einsum("nki,nki->nk", points[:, None] - places, normals)
+        distance = row_dot(points[:, None] - places, normals)
         for i in range(count):
             sheet = sheet_facing(charts, points, normals[:, i], near)
             there = sheet.patch >= 0
@@ -124,13 +121,13 @@ def _intersections(
         points += np.where(met[:, None], steps, 0.0)
         met &= np.linalg.norm(points - middle, axis=1) < near
     if count == 3:  # Near a tip the sheets of patches merge, but the planes of the vertices still meet there.
-        distance = np.einsum("nki,nki->nk", middle[:, None] - places, normals)
+        distance = row_dot(middle[:, None] - places, normals)
         steps, apart = _least_norm_steps(normals, distance)
         tip = ~met & apart & (np.linalg.norm(steps, axis=1) < near)
         points, met, felt = np.where(tip[:, None], middle + steps, points), met | tip, felt & ~tip
     between = normalized(normals.sum(axis=1))
     pairs = charts.pairs(points, edge)
-    toward = np.einsum("mi,mi->m", pairs.normal, between[pairs.point_index])
+    toward = row_dot(pairs.normal, between[pairs.point_index])
     own = np.einsum("mi,mji->mj", pairs.normal, normals[pairs.point_index]).max(axis=1)
     rounded = (toward > own) & (pairs.rho < 1.0) & (np.abs(pairs.distance) > ROUND * edge)
     met[pairs.point_index[rounded]] = False

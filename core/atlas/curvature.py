@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..triangles import LEAST_DIVISOR, normalized, triangle_cross
+from ..triangles import LEAST_DIVISOR, normalized, row_dot, triangle_cross
 from .creases import SHARP
 from .meshing import Mesh
-from .tetrahedra import Indices
+from .tetrahedra import Indices, keyed_sides
 
 # python -m benchmarks.atlas --only ring and --only egg chose these.
 SAGITTA = 80.0  # A quadric is so wide that its sagitta is this many deviations of the surface.
@@ -70,17 +70,14 @@ def _ends(mesh: Mesh, normals: Array) -> Indices:
 
     A folded triangle does not turn the normals at its corners, which are those of larger triangles, too.
     """
-    sides = mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    keys = np.minimum(*sides.T) * len(mesh.vertices) + np.maximum(*sides.T)
+    sides, keys = keyed_sides(mesh.triangles, len(mesh.vertices))
     order = np.argsort(keys, kind="stable")  # It is the fastest here.
     first = np.flatnonzero(np.diff(keys[order]) == 0)
     pairs = np.stack([order[first], order[first + 1]])
     across = normalized(triangle_cross(mesh.vertices[mesh.triangles]))
     opposite = np.roll(mesh.triangles, -2, axis=1).ravel()[pairs]  # The corners that are not on the side.
     is_end = np.ones(len(sides), dtype=bool)
-    is_end[pairs] = (np.einsum("ni,ni->n", *across[pairs // 3]) < SHARP) & (
-        np.einsum("ni,ni->n", *normals[opposite]) < TURNED
-    )
+    is_end[pairs] = (row_dot(*across[pairs // 3]) < SHARP) & (row_dot(*normals[opposite]) < TURNED)
     return sides[is_end]
 
 
@@ -118,11 +115,11 @@ def _neighborhoods(
     """
     off, ups = sheets.tree.data[at] - points[:, None], sheets.normals[at]
     alike = np.einsum("nki,ni->nk", ups, normals) > LEAST_COSINE
-    across = np.abs(np.einsum("nki,nki->nk", off, ups + normals[:, None]))
+    across = np.abs(row_dot(off, ups + normals[:, None]))
     x = normalized(np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)]))
     plane = np.stack([x, np.cross(normals, x)], axis=2)
-    same = alike & (across <= ACROSS * distance)
-    return np.where(same, distance, np.inf), np.concatenate([off @ plane, ups @ plane], axis=2)
+    distance = np.where(alike & (across <= ACROSS * distance), distance, np.inf)
+    return distance, np.concatenate([off @ plane, ups @ plane], axis=2)
 
 
 def vertices_shown(

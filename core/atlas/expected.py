@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, number
-from ..contours.contour import tangent_of, vector_of
-from ..contours.finger import Surface, first_contact
+from ..contours.contour import vector_of
+from ..contours.finger import Surface
 from ..contours.tracking import generator_of
 from ..exploration.options import ExplorationOptions
 from ..exploration.side_by_side import exploring_many
 from ..reconstruction.result import Reconstruction
 from ..steps import result_of
-from .finger import Finger
+from .finger import finger_at
 from .rims import radial_extent
 from .touching import FIRST_EXTENT, NEAR, SIZE
 
@@ -48,9 +48,8 @@ def expected_touches(
     for point, n, e in zip(p, up, result_of(exploring_many(surface, p, up, options)), strict=True):
         if isinstance(e, ValueError):
             continue
-        normal = vector_of(n)
-        side = first_contact(surface, vector_of(point), normal, tangent_of(normal, None), e.step)[2]
-        radii = e.result.radius * radial_extent(e.result, Finger(surface, side), NEAR * tolerance)
+        finger = finger_at(surface, vector_of(point), vector_of(n), e.step)
+        radii = e.result.radius * radial_extent(e.result, finger, NEAR * tolerance)
         felt.append(float(np.pi * np.mean(radii**2)))
     if not any(felt):
         raise ValueError("points: expected some where a patch can be felt, got none")

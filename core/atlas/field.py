@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..triangles import normalized
+from ..triangles import normalized, row_dot
 from .charts import MARGIN, Charts, Pairs
 from .indicator import Indicator
 
@@ -49,10 +49,6 @@ class Blend(NamedTuple):
     normal: Array
     patch: NDArray[np.intp]
 
-    def chosen(self, which: NDArray[np.intp]) -> "Blend":
-        """The sheet near some of the places."""
-        return Blend._make(values[which] for values in self)
-
     def where(self, which: NDArray[np.bool_], other: "Blend") -> "Blend":
         """These at places (k,) where `which` holds, and those of another elsewhere."""
         return Blend(
@@ -78,10 +74,6 @@ class SurfaceSample(NamedTuple):
     rho: Array
     creases: NDArray[np.intp]
 
-    def chosen(self, which: NDArray[np.intp]) -> "SurfaceSample":
-        """The surface near some of the places."""
-        return SurfaceSample._make(values[which] for values in self)
-
 
 def node_weights(charts: Charts, pairs: Pairs) -> Array:
     """The weights (m,) of patches in a blend."""
@@ -105,12 +97,11 @@ def facing_alike(charts: Charts, pairs: Pairs, up: Array, offset: Array, radius:
 
 def _facing(charts: Charts, pairs: Pairs, up: Array) -> Array:
     """From 1 to 0, (m,), how much patches face the way of normals (m, 3)."""
-    cosine: Array = np.einsum("mi,mi->m", pairs.normal, up)
+    cosine: Array = row_dot(pairs.normal, up)
     is_flat = charts.is_flat[pairs.patch]
     apart, most = np.where(is_flat, FLAT_APART, APART), np.where(is_flat, FLAT_AGREE, AGREE)
     agree: Array = np.clip((cosine - apart) / (most - apart), 0.0, 1.0)
-    agree *= agree * (3.0 - 2.0 * agree)
-    return agree
+    return agree * (agree * (3.0 - 2.0 * agree))
 
 
 def _within(off: Array, band: Array) -> Array:
@@ -153,13 +144,13 @@ def surface_within_margin(
 ) -> SurfaceSample:
     """The surface of `surface_at`, but only of patches within a margin of their rims."""
     pairs, count = charts.pairs(points, band, margin), len(points)
-    pairs = pairs.chosen(np.einsum("mi,mi->m", pairs.normal, up[pairs.point_index]) > SIDEWAYS)
+    pairs = pairs.chosen(row_dot(pairs.normal, up[pairs.point_index]) > SIDEWAYS)
     rho = np.full(count, np.inf)
     np.minimum.at(rho, pairs.point_index, pairs.rho)
     sheets = sheets_at(charts, pairs, count)
     found, several = sheets[0], np.flatnonzero(sheets[1].patch >= 0)
     if len(several):
-        some = [sheet.chosen(several) for sheet in sheets]
+        some = [Blend._make(values[several] for values in sheet) for sheet in sheets]
         for old, new in zip(found, _combine_sheets(indicator, points[several], some), strict=True):
             old[several] = new
     return SurfaceSample(*found, rho, (sheets[1].patch >= 0).astype(np.intp) + (sheets[2].patch >= 0))
@@ -191,7 +182,7 @@ def _min_or_max(a: Blend, b: Blend, convex: NDArray[np.bool_]) -> Blend:
 
 def _is_convex(indicator: Indicator, points: Array, a: Blend, b: Blend) -> NDArray[np.bool_]:
     """Whether the crease of two sheets near places (k, 3) is convex: on both sides of it is the outside."""
-    cosine = np.einsum("ki,ki->k", a.normal, b.normal)
+    cosine = row_dot(a.normal, b.normal)
     sine = np.maximum(1.0 - cosine**2, LEAST_SINE**2)
     most = FARTHEST * indicator.cell
     p, q = (np.clip((u.distance - cosine * v.distance) / sine, -most, most) for u, v in ((a, b), (b, a)))
@@ -221,12 +212,10 @@ def argmin_per_point(place: NDArray[np.intp], key: NDArray[Any], count: int) -> 
 
     place : (m,), sorted
     """
-    found = np.full(count, -1)
-    if len(place):
-        starts = np.flatnonzero(np.diff(place, prepend=-1))
-        least = np.minimum.reduceat(key, starts)
-        those = np.flatnonzero(key == np.repeat(least, np.diff(starts, append=len(place))))
-        found[place[those[::-1]]] = those[::-1]  # The first of equal ones stays.
+    found, starts = np.full(count, -1), np.flatnonzero(np.diff(place, prepend=-1))
+    least = np.minimum.reduceat(key, starts)
+    those = np.flatnonzero(key == np.repeat(least, np.diff(starts, append=len(place))))[::-1]
+    found[place[those]] = those  # The first of equal ones stays.
     return found
 
 

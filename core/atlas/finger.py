@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arguments import Array
 from ..contours.contour import Vector, along, cross, dot, scaled, tangent_of
-from ..contours.finger import SAME_SHEET_COSINE, Contact, Hit, Surface, contact_of
+from ..contours.finger import SAME_SHEET_COSINE, Contact, Hit, Surface, contact_of, first_contact
 
 # python -m benchmarks.atlas judges these.
 DISK_PLACES = 36  # A disk around a contact is felt at this number of places.
@@ -38,12 +38,10 @@ class Finger(NamedTuple):
         radius : that of the patch on whose rim the point lies
         """
         down, height = scaled(normal, -1.0), min(s, LOW * radius)
-        for start in (0.0, -0.5 * s):  # The patch may end a little beyond its surface.
-            above = along(along(point, normal, height), t, start)
-            found = self._felt(self.surface.ray_cast(above, down, 2.0 * height), down)
-            if found is not None:
-                break
-        else:
+        # The patch may end a little beyond its surface.
+        above = (along(along(point, normal, height), t, start) for start in (0.0, -0.5 * s))
+        found = next(filter(None, (self.met(p, down, 2.0 * height) for p in above)), None)
+        if found is None:
             return None
         at = along(found[0], normal, HAIR * radius)
         for way, length in ((t, s), (down, 1.5 * s), (scaled(t, -1.0), 2.5 * s), (normal, 1.5 * s)):
@@ -63,7 +61,7 @@ class Finger(NamedTuple):
         height = ABOVE * radius if roof is None else 0.5 * math.dist(point, roof[0])
         hits, middle, far = [(point, normal)], along(point, normal, height), height + ABOVE * radius
         for way in _disk_around(normal, tangent):
-            felt = self._felt(self.surface.ray_cast(along(middle, way, radius), down, far), down)
+            felt = self.met(along(middle, way, radius), down, far)
             if felt is not None and dot(felt[1], normal) > FACING:
                 hits.append(felt)
         return np.array(hits)
@@ -75,13 +73,21 @@ class Finger(NamedTuple):
     def near(self, point: Vector, normal: Vector, length: float) -> Contact | None:
         """The contact along a normal within a length of a point, if the surface there faces the same way."""
         down = scaled(normal, -1.0)
-        felt = self._felt(self.surface.ray_cast(along(point, normal, length), down, 2.0 * length), down)
+        felt = self.met(along(point, normal, length), down, 2.0 * length)
         return felt if felt is not None and dot(felt[1], normal) > SAME_SHEET_COSINE else None
 
     def _felt(self, hit: Hit | None, way: Vector) -> Contact | None:
         """The contact where a ray in this direction has hit, or None if it came from inside the object."""
         found = None if hit is None else contact_of(hit, self.side)
         return None if found is None or dot(found[1], way) >= 0.0 else found
+
+
+def finger_at(surface: Surface, point: Vector, outward: Vector, step: float) -> Finger:
+    """The finger on the outer side of a surface at a point of it, which is felt from a tenth of a step above.
+
+    Raises ValueError if no surface is there.
+    """
+    return Finger(surface, first_contact(surface, point, outward, tangent_of(outward, None), step)[2])
 
 
 def _disk_around(normal: Vector, tangent: Vector) -> list[Vector]:

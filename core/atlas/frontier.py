@@ -126,8 +126,7 @@ class Frontier:
         contacts = [self.finger.near(vector_of(p), vector_of(n), self.near) for p, n in places]
         felt = np.array([contact for contact in contacts if contact is not None])
         points, normals = felt.reshape(-1, 2, 3).transpose(1, 0, 2)
-        offsets = self.rng.normal(0.0, self.noise, len(points))
-        return Contour(points + offsets[:, None] * normals, normals=normals)
+        return Contour(points + self.rng.normal(0.0, self.noise, (len(points), 1)) * normals, normals=normals)
 
     def push(self, place: RimPlace, gain: float) -> None:
         """Queues a place by the area that a touch there may bring."""
@@ -136,8 +135,7 @@ class Frontier:
 
     def tried(self, touch: Next) -> None:
         """Queues the place of a touch again after the touch was made: something may be left beyond it."""
-        tried = *touch.place.tried, vector_of(touch.point)
-        self.push(replace(touch.place, tried=tried), touch.gain)
+        self.push(replace(touch.place, tried=(*touch.place.tried, vector_of(touch.point))), touch.gain)
 
     def next_touches(self, count: int) -> Generator[None, None, list[Next]]:
         """At most `count` touches, far apart, that bring most. Yields each time before it looks at places."""
@@ -272,27 +270,19 @@ def _rounded(gain: float) -> float:
 
 def _between(points: Array, tried: Sequence[Vector]) -> int:
     """The index of the point (n, 3) in the middle of all, or farthest from where touches were in vain."""
-    if not tried:
-        return _first_least(((points - points.mean(axis=0)) ** 2).sum(axis=1))
-    apart = points[:, None] - np.array(tried)
-    return _first_least(-(apart**2).sum(axis=2).min(axis=1))
-
-
-def _first_least(squares: Array) -> int:
-    """The first index of squared distances (n,), or of their negatives, that are least up to a tie."""
+    if tried:
+        squares = -((points[:, None] - np.array(tried)) ** 2).sum(axis=2).min(axis=1)
+    else:
+        squares = ((points - points.mean(axis=0)) ** 2).sum(axis=1)
     return int(np.argmax(squares <= squares.min() + TIE * np.abs(squares).max()))
 
 
 def border_places(mesh: Mesh) -> Iterator[RimPlace]:
     """Places on the border of a mesh, some edges apart, with the way beyond it."""
-    ends, corners = mesh.border, mesh.vertices
-    if not len(ends):
-        return
-    radius = BORDER_RADIUS * mesh.edge
+    ends, corners, radius = mesh.border, mesh.vertices, BORDER_RADIUS * mesh.edge
     normals, taken = mesh.normals, np.zeros(len(ends), dtype=bool)
     middles = corners[ends].mean(axis=1)
-    for i in range(len(ends)):
-        a, b = ends[i]
+    for i, (a, b) in enumerate(ends):
         if taken[i]:
             continue
         taken |= ((middles - middles[i]) ** 2).sum(axis=1) < (BORDER_APART * radius) ** 2

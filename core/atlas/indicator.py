@@ -7,8 +7,8 @@ minus the divergence of these. The area is spread by cubic B-splines, and Poisso
 transforms on a grid, at the faces of which the indicator is 0.
 """
 
-from collections.abc import Generator, Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Generator, Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +22,7 @@ BORDER = 0.1  # The grid is wider than the samples by this share of the size, on
 MOST_CELLS = 16_000_000  # More cells, of four bytes each, and a copy of them would take too much memory.
 SAMPLES_AT_ONCE = 3000  # A step takes this many samples,
 CELLS_AT_ONCE = 500_000  # or this many cells.
-NEAR = np.stack(np.meshgrid(*[np.arange(4)] * 3, indexing="ij"), axis=-1).reshape(
-    -1, 3
-)  # A B-spline's cells.
+NEAR = np.array(list(np.ndindex(4, 4, 4)))  # The grid points that a cubic B-spline reaches.
 
 
 class Indicator(NamedTuple):
@@ -89,21 +87,23 @@ def solve_poisson(
         _add_divergence(values, (points[some] - low) / cell, areas[some] / cell**2)
         yield 0.0
     waves = [(np.pi / (n + 1.0) * np.arange(1, n + 1)) ** 2 for n in shape]
-    for axis in range(3):
-        for slab in _slabs(values, axis):
-            values[slab] = dst(values[slab], type=1, axis=axis)
-            yield 0.0
+    yield from _transform(values, dst)
     for slab in _slabs(values, 1):
         values[slab] /= waves[0][slab[0], None, None] + waves[1][:, None] + waves[2]
         yield 0.0
-    for axis in range(3):
-        for slab in _slabs(values, axis):
-            values[slab] = idst(values[slab], type=1, axis=axis)
-            yield 0.0
+    yield from _transform(values, idst)
     found = Indicator(values, low, cell, size, thinnest)
     values -= np.average(found.at(points), weights=np.linalg.norm(areas, axis=1))
     yield 0.0
     return found
+
+
+def _transform(values: NDArray[np.float32], sine: Callable[..., Any]) -> Generator[float, None, None]:
+    """Sine transforms of the first type, or their inverse, of a grid in place; yields 0 between its steps."""
+    for axis in range(3):
+        for slab in _slabs(values, axis):
+            values[slab] = sine(values[slab], type=1, axis=axis)
+            yield 0.0
 
 
 def _slabs(values: NDArray[np.float32], axis: int) -> Iterator[tuple[slice, ...]]:

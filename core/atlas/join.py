@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from ..contours.contour import Contour
 from ..reconstruction.result import Reconstruction
-from ..triangles import normalized
+from ..steps import chunked
+from ..triangles import normalized, row_dot
 from .charts import AZIMUTHS, MARGIN, Charts, Pairs
 from .cubic_spline import SIDE, upsampled
 from .field import LAYER, sheet_facing
@@ -50,19 +51,17 @@ def refit(
     earlier : number of contacts and table of each patch that was joined before; changed in place
     """
     points, normals, owner = _contacts(contours)
-    parts = []
-    for start in range(0, len(points), PLACES_AT_ONCE):
-        part = charts.pairs(points[start : start + PLACES_AT_ONCE])
-        parts.append(part._replace(point_index=start + part.point_index))
-        yield 0.0
+
+    def pairs_of(some: Array, indices: NDArray[np.intp]) -> Pairs:
+        """The pairs of some of the contacts, with the indices that these have among all."""
+        found = charts.pairs(some)
+        return found._replace(point_index=indices[found.point_index])
+
+    every = np.arange(len(points))
+    pairs = Pairs._make((yield from chunked(pairs_of, PLACES_AT_ONCE, 0.0, points, every)))
     for order in ROUGHNESS:  # Otherwise the first spline would take ten times as long as the others.
         penalty(order)
         yield 0.0
-    columns = []
-    for values in zip(*parts, strict=True):
-        columns.append(np.concatenate(values))
-        yield 0.0
-    pairs = Pairs(*columns)
     each = np.argsort(pairs.patch, kind="stable")
     yield 0.0
     bounds = np.searchsorted(pairs.patch[each], np.arange(len(results) + 1))
@@ -93,13 +92,12 @@ def _joined_table(
     likely = np.hypot(least, UNDOUBTED * r.mean_height_std / r.radius)
     likely = likely * (1.0 + LOOSER * np.maximum(some.rho - 1.0, 0.0))
     off = np.abs(some.distance) / (r.radius * likely)
-    facing = np.einsum("mi,mi->m", some.normal, normals[some.point_index]) > ALIGNED
+    facing = row_dot(some.normal, normals[some.point_index]) > ALIGNED
     on = own[some.point_index] | ((off < FARTHEST) & facing)
     place = some.point_index[on]
     local = (points[place] - r.frame.origin) @ r.frame.axes / r.radius
     weights = 1.0 / np.maximum(off[on], 1.0) ** 2
-    found = smoothing_spline(local, normals[place] @ r.frame.axes, weights, half, least)
-    return rim, half, *found
+    return rim, half, *smoothing_spline(local, normals[place] @ r.frame.axes, weights, half, least)
 
 
 def blend_heights(charts: Charts) -> Joining:
@@ -128,10 +126,9 @@ def _move(charts: Charts, patch: NDArray[np.intp], x: Array, y: Array) -> Array:
     """How far patches (k,) have to move above local (x, y), in unit radius, to lie on the blend."""
     points, normals = charts.world(patch, x, y)
     field = sheet_facing(charts, points, normals, LAYER * charts.radii[patch])
-    up = np.einsum("ki,ki->k", field.normal, charts.axes[patch, :, 2])
+    up = row_dot(field.normal, charts.axes[patch, :, 2])
     move = -field.distance / np.maximum(up, FACING) / charts.radii[patch]
-    on = (field.patch >= 0) & (up > FACING) & (np.abs(move) < MOVED)
-    return np.where(on, move, 0.0)
+    return np.where((field.patch >= 0) & (up > FACING) & (np.abs(move) < MOVED), move, 0.0)
 
 
 def _contacts(contours: Sequence[list[Contour]]) -> tuple[Array, Array, NDArray[np.intp]]:
@@ -163,13 +160,16 @@ def stacked(results: Sequence[Reconstruction], tables: Sequence[Table]) -> Chart
 
 
 def tabulate(r: Reconstruction, rim: Array, deviations: bool) -> Table:
-    """The table of a patch with this rim (AZIMUTHS,), in unit radius, fitted only to its own contacts."""
+    """The table of a patch with this rim (AZIMUTHS,), in unit radius, fitted only to its own contacts.
+
+    deviations : whether they are computed; otherwise they are 0
+    """
     from scipy.ndimage import spline_filter
 
     half = _half(rim)
     x, y = (axis.ravel() for axis in np.meshgrid(*2 * [np.linspace(-half, half, SIDE)], indexing="ij"))
-    at = np.arctan2(y, x) * (AZIMUTHS / (2.0 * np.pi)) % AZIMUTHS
-    share = np.hypot(x, y) / np.interp(at, np.arange(AZIMUTHS + 1), np.append(rim, rim[0]))
+    at = np.arctan2(y, x) * (AZIMUTHS / (2.0 * np.pi))
+    share = np.hypot(x, y) / np.interp(at, np.arange(AZIMUTHS), rim, period=AZIMUTHS)
     # Farther out a sextic runs away, and the spline would carry that inward.
     pull = r.radius * np.minimum(1.0, KNOTS_WITHIN / np.maximum(share, 1e-9))
     heights = r.height(pull * x, pull * y).reshape(SIDE, SIDE) / r.radius
@@ -184,6 +184,5 @@ def _half(rim: Array) -> float:
 
 def _stds(r: Reconstruction, x: Array, y: Array) -> Array:
     """Deviations (SIDE, SIDE), computed at every other knot, because they are smooth and cost the most."""
-    coarse = slice(None, None, 2)
-    x, y = x.reshape(SIDE, SIDE)[coarse, coarse], y.reshape(SIDE, SIDE)[coarse, coarse]
+    x, y = (each.reshape(SIDE, SIDE)[::2, ::2] for each in (x, y))
     return upsampled(r.height_std(x.ravel(), y.ravel()).reshape(x.shape) / r.radius)

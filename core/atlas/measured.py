@@ -15,12 +15,14 @@ from ..reconstruction.from_contours import reconstruct_many
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.start import TOUCH_ROUNDING, too_coarse
 from ..steps import part_of, result_of
+from ..triangles import row_dot
 from .charts import AZIMUTHS, Charts
 from .finger import FACING
 from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
 from .object_atlas import Atlas, joined_surface
 from .orientation import doubt_of, oriented, place_text, planes_of, sharpened
+from .tetrahedra import connected_pieces
 from .unfelt import uncovered_places
 
 # python -m benchmarks.robot judges these.
@@ -84,8 +86,7 @@ def cover_contacts(
     noise = None if noise is None else number("noise", noise, least=0.0)
     contacts, noise, doubt = _contacts(contours_or_strokes, outward, noise)
     yield 0.0
-    cloud = _Cloud(contacts, cKDTree(contacts.points), noise, largest)
-    found, charts = yield from _patches(cloud)
+    found, charts = yield from _patches(_Cloud(contacts, cKDTree(contacts.points), noise, largest))
     reference = yield from part_of(joined_surface(found, charts, largest, contacts), 1.0, 1.0)
     places = uncovered_places(reference, charts)
     atlas = Atlas(tuple(found), charts, reference, largest, places, contacts=contacts)
@@ -140,8 +141,7 @@ def _each_once(strokes: list[Contour]) -> tuple[list[Contour], Array]:
     """The strokes without contacts that earlier ones have, too, which add nothing; all contacts (n, 3)."""
     points = np.vstack([np.empty((0, 3)), *(stroke.points for stroke in strokes)])
     order, starts = equal_points(points)
-    is_first = np.zeros(len(points), dtype=bool)
-    is_first[order[starts]] = True
+    is_first = np.bincount(order[starts], minlength=len(points)) > 0
     found, ends = [], np.cumsum([len(stroke.points) for stroke in strokes])
     for stroke, end in zip(strokes, ends.tolist(), strict=True):
         which = is_first[end - len(stroke.points) : end]
@@ -163,7 +163,7 @@ def _require_one_side(points: Array, normals: Array) -> None:
     chords, others = points[near] - points[:, None], normals[near]
     facing = np.einsum("nki,ni->nk", others, normals)
     sums = normals[:, None] + np.copysign(1.0, facing)[..., None] * others
-    apart = np.abs(np.einsum("nki,nki->nk", chords, sums))
+    apart = np.abs(row_dot(chords, sums))
     usual = np.median(apart[facing > FACING]) if (facing > FACING).any() else 0.0
     wrong = (facing < -FACING) & (apart <= SAME_PLACE * usual)
     if wrong.mean() > OPPOSITE:
@@ -179,7 +179,7 @@ def _beyond_bend(centers: Array, contacts: Array, links: NDArray[np.intp]) -> tu
     There kappa_center < -1 / r, and contacts (n, 3) lie the other way around than their centers.
     """
     ways, below = (points[links] - points[:, None] for points in (centers, contacts))
-    turned = np.einsum("nki,nki->nk", ways, below) < -TURNED * np.einsum("nki,nki->nk", ways, ways)
+    turned = row_dot(ways, below) < -TURNED * row_dot(ways, ways)
     beyond = turned.mean(axis=1) > TURNED
     if beyond.mean() <= TURNED:
         return None
@@ -197,7 +197,7 @@ def _off_contacts(atlas: Atlas, contacts: MeasuredContacts, noise: float) -> tup
     _, triangle, *_ = atlas.reference.feet(points)
     explained = OFF_STDS * np.hypot(np.where(np.isfinite(std), std, 0.0), noise)
     off = np.abs(distance) > np.maximum(explained, OFF_CELLS * atlas.reference.indicator.cell)
-    off |= np.einsum("ni,ni->n", atlas.reference.normals[triangle], normals) < 0.0
+    off |= row_dot(atlas.reference.normals[triangle], normals) < 0.0
     if off.mean() <= OFF:
         return None
     return "uncertain", (
@@ -216,18 +216,13 @@ class _Cloud(NamedTuple):
 
     def same_sheet(self, i: int, radius: float) -> NDArray[np.intp]:
         """Those contacts around contact i that face the same way and are linked with it, so of its wall."""
-        from scipy.sparse import csr_array
-        from scipy.sparse.csgraph import connected_components
-
         near = np.array(self.tree.query_ball_point(self.contacts.points[i], radius))
         near = near[self.contacts.normals[near] @ self.contacts.normals[i] > FACING]
         links, order = self.contacts.links[near], np.argsort(near)
         at = order[np.minimum(np.searchsorted(near, links, sorter=order), len(near) - 1)]
         linked = near[at] == links
-        ends = np.append(0, np.cumsum(linked.sum(axis=1)))
-        graph = csr_array((np.ones(ends[-1]), at[linked], ends), (len(near), len(near)))
-        wall = connected_components(graph, directed=False)[1]
-        return near[wall == wall[np.flatnonzero(near == i)]]
+        _, piece = connected_pieces(np.nonzero(linked)[0], at[linked], len(near))
+        return near[piece == piece[np.flatnonzero(near == i)]]
 
     def patches(self, places: Sequence[int], radius: float) -> list[Reconstruction | None]:
         """The patch of those contacts around each place that are of its wall; None where they carry none."""
@@ -332,8 +327,7 @@ def _patches(cloud: _Cloud) -> Generator[float, None, tuple[list[Reconstruction]
         if not left[i]:
             continue
         r, last = cloud.largest_patch(i, radii, last)
-        some = cloud.same_sheet(i, MISSING * radius)
-        left[some] = False
+        left[cloud.same_sheet(i, MISSING * radius)] = False
         if r is not None:
             found.append(r)
             tables.append(tabulate(r, cloud.rim(i, r), deviations=True))

@@ -7,6 +7,7 @@ patches that face as the indicator does. Triangles where no patch is are left ou
 """
 
 from collections.abc import Callable, Generator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,16 @@ from .creases import insert_creases
 from .field import INSIDE, SurfaceSample, surface_at
 from .finger import FACING
 from .indicator import Indicator
-from .tetrahedra import Indices, march, smoothed, subdivided, tetrahedra_of, unique
+from .tetrahedra import (
+    Indices,
+    connected_pieces,
+    keyed_sides,
+    march,
+    smoothed,
+    subdivided,
+    tetrahedra_of,
+    unique,
+)
 
 # python -m benchmarks.atlas judges these.
 CELL = 2.1  # A cube of the lattice is as long as this many edges of the mesh.
@@ -83,8 +93,7 @@ class Mesh(NamedTuple):
 
     def chosen(self, which: NDArray[np.bool_]) -> "Mesh":
         """Some of the triangles, and their vertices."""
-        used = np.zeros(len(self.vertices), dtype=bool)
-        used[self.triangles[which]] = True
+        used = np.bincount(self.triangles[which].ravel(), minlength=len(self.vertices)) > 0
         index = np.cumsum(used) - 1
         return Mesh(self.vertices[used], index[self.triangles[which]], self.std[used], self.patch[used])
 
@@ -94,8 +103,7 @@ class Mesh(NamedTuple):
 
         Also which sides (3 m,) no other triangle has, and whether each edge belongs to exactly two.
         """
-        sides = self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-        keys = sides.min(axis=1) * len(self.vertices) + sides.max(axis=1)
+        sides, keys = keyed_sides(self.triangles, len(self.vertices))
         order = np.sort(keys)
         first = np.flatnonzero(np.diff(order, prepend=-1))
         counts = np.diff(first, append=len(order))
@@ -181,12 +189,12 @@ def meshed(
         yield 0.7
         vertices, surface = yield from _project_and_smooth(charts, indicator, vertices, up, triangles, band)
     yield 0.9
-    every = np.arange(len(vertices))
+    old = np.arange(len(vertices))
     vertices, triangles, parents, unfelt = yield from insert_creases(
         charts, vertices, triangles, surface.normal, edge
     )
     yield 0.9
-    surface = surface.chosen(np.append(every, parents))
+    surface = SurfaceSample._make(values[np.append(old, parents)] for values in surface)
     surface = surface._replace(std=np.hypot(surface.std, CONTINUED_STD * unfelt))
     return (yield from _trim_unfelt(vertices, triangles, surface, indicator, ended, contacts))
 
@@ -202,20 +210,24 @@ def _level(indicator: Indicator, size: float) -> Generator[float, None, tuple[Ar
     (values,) = yield from chunked(lambda some: (-indicator.at(some),), LATTICE_AT_ONCE, 0.1, points)
     ends, triangles = march(tetrahedra, values)
     yield 0.2
-    found = []
-    for few in np.array_split(ends, len(ends) // PLACES_AT_ONCE + 1):
-        a, b = points[few].transpose(1, 0, 2)
-        low, high = np.zeros(len(few)), np.ones(len(few))
-        is_inside = indicator.at(a) > 0.0
-        for _ in range(HALVINGS):  # The indicator is a step, so its values do not show how far the level is.
-            middle = 0.5 * (low + high)
-            same = (indicator.at(a + middle[:, None] * (b - a)) > 0.0) == is_inside
-            low, high = np.where(same, middle, low), np.where(same, high, middle)
-        level, clipped = 0.5 * (low + high)[:, None], np.clip(low, CLIP, 1.0 - CLIP)[:, None]
-        found.append((a + clipped * (b - a), indicator.outward(a + level * (b - a))))
-        yield 0.2
-    vertices, up = (np.concatenate(values) for values in zip(*found, strict=True))
+    a, b = points[ends].transpose(1, 0, 2)
+    vertices, up = yield from chunked(partial(_crossings, indicator), PLACES_AT_ONCE, 0.2, a, b)
     return vertices, up, triangles
+
+
+def _crossings(indicator: Indicator, a: Array, b: Array) -> tuple[Array, Array]:
+    """Vertices where edges from a to b, (n, 3) each, cross the level of the indicator, but for CLIP.
+
+    Also the way outward where they do, (n, 3) each.
+    """
+    low, high = np.zeros(len(a)), np.ones(len(a))
+    is_inside = indicator.at(a) > 0.0
+    for _ in range(HALVINGS):  # The indicator is a step, so its values do not show how far the level is.
+        middle = 0.5 * (low + high)
+        same = (indicator.at(a + middle[:, None] * (b - a)) > 0.0) == is_inside
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    level, clipped = 0.5 * (low + high)[:, None], np.clip(low, CLIP, 1.0 - CLIP)[:, None]
+    return a + clipped * (b - a), indicator.outward(a + level * (b - a))
 
 
 def _cells(indicator: Indicator, size: float) -> Generator[float, None, Indices]:
@@ -291,9 +303,7 @@ def _reproject(
 def _folded(vertices: Array, normals: Array, triangles: Indices) -> NDArray[np.bool_]:
     """Which vertices (n,) are of triangles that face against the normals (n, 3) of the surface."""
     against = row_dot(triangle_cross(vertices[triangles]), normals[triangles].sum(axis=1)) < 0.0
-    folded = np.zeros(len(vertices), dtype=bool)
-    folded[triangles[against]] = True
-    return folded
+    return np.bincount(triangles[against].ravel(), minlength=len(vertices)) > 0
 
 
 def _project_onto_surface(
@@ -329,15 +339,11 @@ def _trim_unfelt(
     as small as some cells of the indicator is bridged. A later mesh ends where the first one did,
     where most of what lies beyond patches is off the first.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     yield 0.9
     near = surface.rho < MARGIN
     inside = near & ((surface.rho < INSIDE) | (surface.creases > 0))
     beyond = triangles[~inside[triangles].all(axis=1)]
-    links = np.ones(2 * len(beyond)), (beyond[:, :2].ravel(), beyond[:, 1:].ravel())
-    count, piece = connected_components(coo_matrix(links, (len(vertices),) * 2))
+    count, piece = connected_pieces(beyond[:, :2].ravel(), beyond[:, 1:].ravel(), len(vertices))
     yield 0.9
     meets_inside = np.bincount(piece[inside], minlength=count) > 0
     gone = ~inside & ~meets_inside[piece]

@@ -242,7 +242,7 @@ class Atlas:
     @property
     def contradicting(self) -> NDArray[np.bool_]:
         """Which contacts of the check (n,) are farther from the surface than is explained."""
-        stds = self._contacts[1]
+        _, stds = self._contacts
         return self._farther(np.maximum(OFF_STDS * stds, OFF_TOLERANCES * (self.tolerance or 0.0)))
 
     @property
@@ -373,18 +373,19 @@ class Atlas:
 
         Raises ValueError for edges that are longer than the object, or take too much memory.
         """
-        edge, size = number("edge", edge, above=0.0), self.reference.indicator.size
-        if edge > size:
-            raise ValueError(f"edge: expected at most the size of what was felt, {size:.3g}, got {edge:.3g}")
-        lattice, _ = lattice_of(self.reference.indicator, edge)
+        edge, indicator = number("edge", edge, above=0.0), self.reference.indicator
+        if edge > indicator.size:
+            raise ValueError(
+                f"edge: expected at most the size of what was felt, {indicator.size:.3g}, got {edge:.3g}"
+            )
+        lattice, _ = lattice_of(indicator, edge)
         memory = memory_of(*self.reference.mesh[:2], edge, lattice)
         if memory > MOST_BYTES:
             raise ValueError(
                 f"edge: expected triangles that take {1e-9 * MOST_BYTES:g} GB of memory or less, got "
                 f"{edge:.3g}, which takes {1e-9 * memory:.3g} GB: use a longer one"
             )
-        indicator, ended = self.reference.indicator, self.reference.ended
-        mesh, _ = yield from meshed(self.charts, indicator, edge, ended, self.contacts)
+        mesh, _ = yield from meshed(self.charts, indicator, edge, self.reference.ended, self.contacts)
         return mesh if self.border is None else snapped_to_border(mesh, self.border)
 
     def to_dict(self) -> dict[str, Any]:

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import Array
-from ..triangles import normalized
-from .tetrahedra import Indices
+from ..triangles import normalized, row_dot
+from .tetrahedra import Indices, connected_pieces
 
 # python -m benchmarks.measured --orientation judges these.
 FEWEST, MOST, MORE = 8, 600, 1.5  # The numbers of a plane's neighbors, and their growth until it is certain:
@@ -96,13 +96,13 @@ def sharpened(points: Array, normals: Array, planes: Planes) -> Array:
     plane that passes through both.
     """
     links, rms = planes.links, planes.rms
-    off = np.abs(np.einsum("nki,nki->nk", normals[links], points[:, None] - points[links]))
+    off = np.abs(row_dot(normals[links], points[:, None] - points[links]))
     is_none = (rms[links] > FLATTER * rms[:, None]) | (off > THROUGH * rms[links])
     off = np.where(is_none, np.inf, np.hypot(off, rms[links]))
     best = np.argmin(off, axis=1)
     every = np.arange(len(points))
     other = normals[links[every, best]]
-    other = other * np.copysign(1.0, np.einsum("ni,ni->n", other, normals))[:, None]
+    other = other * np.copysign(1.0, row_dot(other, normals))[:, None]
     return np.where(np.isfinite(off[every, best])[:, None], other, normals)
 
 
@@ -112,8 +112,8 @@ def reflection_agreement(points: Array, normals: Array, i: Indices, j: Indices) 
     Also the larger absolute cosine between a normal and the way from one contact to the other, (m,).
     """
     way = normalized(points[j] - points[i])
-    a, b = (np.einsum("mi,mi->m", normals[k], way) for k in (i, j))
-    return np.einsum("mi,mi->m", normals[i], normals[j]) - 2.0 * a * b, np.maximum(np.abs(a), np.abs(b))
+    a, b = (row_dot(normals[k], way) for k in (i, j))
+    return row_dot(normals[i], normals[j]) - 2.0 * a * b, np.maximum(np.abs(a), np.abs(b))
 
 
 def oriented(
@@ -159,12 +159,10 @@ def _bridged(
     points: Array, normals: Array, i: Indices, j: Indices, weights: Array
 ) -> tuple[Indices, Indices, Array]:
     """The links and those between pieces that they do not connect, from the nearest contacts of these."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     while True:
-        count, piece = connected_components(coo_matrix((np.ones(len(i)), (i, j)), (len(points),) * 2))
+        count, piece = connected_pieces(i, j, len(points))
         if count == 1:
             return i, j, weights
         largest = np.bincount(piece).argmax()
@@ -205,12 +203,8 @@ def _propagated_signs(
 
 def _regions(tree: Any, n: int) -> Indices:
     """The regions (n,) of a tree that its uncertain links separate; small ones join adjacent ones."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     certain = tree.data < CERTAIN
-    links = np.ones(certain.sum()), (tree.row[certain], tree.col[certain])
-    count, region = connected_components(coo_matrix(links, (n, n)))
+    count, region = connected_pieces(tree.row[certain], tree.col[certain], n)
     sizes, first = np.bincount(region).tolist(), list(range(count))
 
     def of(one: int) -> int:
@@ -242,7 +236,7 @@ def _winding_signs(points: Array, normals: Array, areas: Array, region: Indices)
         for at in some:
             off = points - points[at]
             away = np.maximum(np.linalg.norm(off, axis=1), np.sqrt(areas[at]))
-            angle = areas * np.einsum("ni,ni->n", off, normals) / away**3
+            angle = areas * row_dot(off, normals) / away**3
             numbers[one] += np.bincount(region, angle, count) / (4.0 * np.pi * len(some))
     sides = np.ones(count)
 
@@ -264,7 +258,7 @@ def _global_sign(normals: Array, known: Array | None, up: Array | None, number: 
     Raises ValueError if nothing of these is decisive.
     """
     if known is not None and known.any():
-        return float(np.copysign(1.0, np.einsum("ni,ni->n", known, normals).sum()))
+        return float(np.copysign(1.0, row_dot(known, normals).sum()))
     mean = 0.0 if up is None else float((normals @ up).mean())
     if number > CLOSED and abs(mean) < DECISIVE:
         return 1.0
@@ -286,7 +280,7 @@ def doubt_of(points: Array, normals: Array, planes: Planes) -> tuple[str, str] |
             f"Normals contradict each other around {place_text(points[against])}: strokes are too far apart "
             "there, or normals are wrong."
         )
-    facing = np.einsum("mi,mi->m", normals[i], normals[j]) < -FACING
+    facing = row_dot(normals[i], normals[j]) < -FACING
     walls = np.bincount(i, facing & (bend > FACING)) > 0
     if walls.mean() > CONFUSED:
         return "uncertain", (

@@ -58,10 +58,8 @@ class ReferenceMesh:
     def fans(self) -> Indices:
         """The triangles at each vertex, (n, most); the first one again where there are fewer."""
         corners = self.mesh.triangles.ravel()
-        order, counts = (
-            np.argsort(corners, kind="stable"),
-            np.bincount(corners, minlength=len(self.mesh.vertices)),
-        )
+        order = np.argsort(corners, kind="stable")
+        counts = np.bincount(corners, minlength=len(self.mesh.vertices))
         start, steps = np.cumsum(counts) - counts, np.arange(counts.max())
         return order[start[:, None] + np.where(steps < counts[:, None], steps, 0)] // 3
 
@@ -78,9 +76,7 @@ class ReferenceMesh:
     @cached_property
     def is_open(self) -> NDArray[np.bool_]:
         """Whether the mesh ends at each vertex, (n,)."""
-        found = np.zeros(len(self.mesh.vertices), dtype=bool)
-        found[self.mesh.border] = True
-        return found
+        return np.bincount(self.mesh.border.ravel(), minlength=len(self.mesh.vertices)) > 0
 
     @cached_property
     def angles(self) -> Array:
@@ -88,7 +84,7 @@ class ReferenceMesh:
         corners = self.mesh.vertices[self.mesh.triangles]
         sides = np.roll(corners, -1, axis=1) - corners
         across = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)[:, None]
-        angles = np.arctan2(across, -np.einsum("nki,nki->nk", sides, np.roll(sides, 1, axis=1)))
+        angles = np.arctan2(across, -row_dot(sides, np.roll(sides, 1, axis=1)))
         count = len(self.mesh.vertices)
         return np.bincount(self.mesh.triangles.ravel(), angles.ravel(), count).astype(np.float64)
 
@@ -115,14 +111,14 @@ class ReferenceMesh:
         feet, weights = closest_point(self.mesh.vertices[self.mesh.triangles[some]], points[:, None])
         off = points[:, None] - feet
         away = np.linalg.norm(off, axis=2)
-        across = np.abs(np.einsum("nki,nki->nk", off, self.normals[some]))
+        across = np.abs(row_dot(off, self.normals[some]))
         as_near = away <= (1.0 + SAME) * away.min(axis=1, keepdims=True)
         best = np.argmax(np.where(as_near, across, -1.0), axis=1)
         row = np.arange(len(points))
         triangle = some[row, best]
         corners = self.mesh.triangles[triangle]
         ends = (self.is_open[corners] | (weights[row, best] < ON_SIDE)).all(axis=1)
-        std = np.einsum("ni,ni->n", weights[row, best], self.mesh.std[corners])
+        std = row_dot(weights[row, best], self.mesh.std[corners])
         return feet[row, best], triangle, std, ends
 
     def ended(self, points: Array) -> NDArray[np.bool_]:
@@ -130,8 +126,7 @@ class ReferenceMesh:
         if not self.is_open.any():
             return np.zeros(len(points), dtype=bool)
         feet, _, _, ends = self.feet(points)
-        off: NDArray[np.bool_] = np.linalg.norm(points - feet, axis=1) > self.edge
-        return off | ends
+        return ends | (np.linalg.norm(points - feet, axis=1) > self.edge)
 
     def away(self, point: Vector) -> float:
         """The distance of a point from the triangles."""
@@ -140,10 +135,10 @@ class ReferenceMesh:
     def distances(self, charts: Charts, points: Array) -> tuple[Array, Array]:
         """Signed distances (n,) of places (n, 3), and deviations (n,), inf beyond where the mesh ends."""
         feet, triangle, std, ends = self.feet(points)
-        up, side = self.normals[triangle], np.einsum("ni,ni->n", points - feet, self.normals[triangle])
+        up, side = self.normals[triangle], row_dot(points - feet, self.normals[triangle])
         surface, feet = self._project(charts, feet, up)
         off = points - feet
-        ahead = np.einsum("ni,ni->n", off, surface.normal)
+        ahead = row_dot(off, surface.normal)
         away = np.linalg.norm(off, axis=1)
         # A triangle is a chord: the foot of its plane is a little off that of the surface.
         across = off - ahead[:, None] * surface.normal
@@ -154,7 +149,7 @@ class ReferenceMesh:
         some = some[nearer]
         for old, new in zip((away, feet, *surface), (left, tried, *there), strict=True):
             old[some] = new[nearer]
-        ahead = np.einsum("ni,ni->n", points - feet, surface.normal)
+        ahead = row_dot(points - feet, surface.normal)
         smooth = np.abs(ahead) > AHEAD * away
         side = np.where(smooth & (surface.patch >= 0), ahead, side)
         if not self.is_open.any():

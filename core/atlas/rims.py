@@ -50,8 +50,7 @@ def radial_extent(r: Reconstruction, finger: Finger, near: float) -> Array:
         return 0.0 * domain
     # A straight crease is a line between azimuths whose inverse radius is nearly linear.
     inverse = 1.0 / np.maximum(radii, LEAST_RIM * radii.max())
-    around = np.append(azimuths, AZIMUTHS), np.append(inverse, inverse[0])
-    straight = 1.0 / np.interp(np.arange(AZIMUTHS), *around)
+    straight = 1.0 / np.interp(np.arange(AZIMUTHS), azimuths, inverse, period=AZIMUTHS)
     radii = np.maximum(straight[1::2], _corners(inverse, ended))
     turns += np.pi / TAPS
     between = r.radius * radii * np.stack([np.cos(turns), np.sin(turns)])

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..steps import chunked
+from ..triangles import row_dot
 from .charts import STEEPEST, Charts
 from .field import facing_alike, node_weights, weights_of
 from .indicator import LAYERS, Indicator, solve_poisson
@@ -108,13 +109,11 @@ def _sample_grid(
         if i % PATCHES_AT_ONCE == 0:
             yield 0.0
     patch, x, y, group, aside = (np.concatenate(values) for values in zip(*places, strict=True))
+    _, group = np.unique(group, return_inverse=True)
+    yield 0.0
     # The sample in the middle of a group is first.
     order = np.lexsort((aside, group))
-    yield 0.0
-    _, first, of = np.unique(group[order], return_index=True, return_inverse=True)
-    group = np.empty(len(order), dtype=np.intp)
-    group[order] = of
-    return patch, x, y, order[first], group
+    return patch, x, y, order[np.flatnonzero(np.diff(group[order], prepend=-1))], group
 
 
 def _overlap_weight_and_thickness(
@@ -133,7 +132,7 @@ def _overlap_weight_and_thickness(
     others: Array = np.bincount(pairs.point_index, node_weights(charts, pairs) * alike, count).astype(
         np.float64
     )
-    opposite = (np.einsum("mi,mi->m", pairs.normal, up) < OPPOSITE) & (pairs.rho < 1.0)
+    opposite = (row_dot(pairs.normal, up) < OPPOSITE) & (pairs.rho < 1.0)
     opposite &= np.abs(pairs.distance) > CERTAIN * pairs.std
     thickness = np.full(count, np.inf)
     np.minimum.at(thickness, pairs.point_index[opposite], np.abs(pairs.distance[opposite]))
@@ -145,7 +144,7 @@ def _samples(
 ) -> Samples:
     """Samples of patches at local (x, y); `flat` are their areas in the tangent planes."""
     points, normals = charts.world(patch, x, y)
-    share, steep = charts.shares(x, y, patch), np.einsum("ni,ni->n", normals, charts.axes[patch, :, 2])
+    share, steep = charts.shares(x, y, patch), row_dot(normals, charts.axes[patch, :, 2])
     inside = steep > STEEPEST
     own = weights_of(share, charts.radii[patch] * charts.stds_at(x, y, patch) * steep, charts.radii[patch])
     areas = flat * own / (own + others) / np.maximum(steep, STEEPEST)

@@ -218,8 +218,7 @@ def _student(residuals: Array, std: float) -> Array:
 
 def _stds(factor: Array) -> Array:
     """Deviations (SIDE, SIDE), computed at every other knot, because they are smooth and take the longest."""
-    coarse = _heights_at_coarse_knots()
-    some = np.sqrt((_triangular(factor, coarse, "N") ** 2).sum(axis=0))
+    some = np.sqrt((_triangular(factor, _heights_at_coarse_knots(), "N") ** 2).sum(axis=0))
     return upsampled(some.reshape((SIDE + 1) // 2, -1))
 
 

@@ -23,7 +23,9 @@ FACE_CORNERS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])  # The corners of 
 
 def unique(rows: Indices) -> Indices:
     """The different ones among rows (n, 3) of whole numbers."""
-    return rows[np.unique(_keys(rows), return_index=True)[1]]
+    low = rows.min(axis=0)
+    keys = np.ravel_multi_index(tuple((rows - low).T), tuple(rows.max(axis=0) - low + 1))
+    return rows[np.unique(keys, return_index=True)[1]]
 
 
 def _different(numbers: Indices) -> Indices:
@@ -32,14 +34,10 @@ def _different(numbers: Indices) -> Indices:
     return order[np.diff(order, prepend=order[:1] - 1) > 0]
 
 
-def _keys(rows: Indices) -> Indices:
-    """A number (n,) for each of the rows (n, 3) of whole numbers, equal only for equal rows."""
-    low = rows.min(axis=0)
-    return np.ravel_multi_index(tuple((rows - low).T), tuple(rows.max(axis=0) - low + 1))
-
-
 def tetrahedra_of(cells: Indices) -> Generator[float, None, tuple[Indices, Indices]]:
     """Lattice points (n, 3), in halves of a cube, and tetrahedra (m, 4) on all faces between two cubes.
+
+    cells : (k, 3), the lowest corners of the cubes, in cubes
 
     Yields 0 between its parts.
     """
@@ -65,16 +63,18 @@ def tetrahedra_of(cells: Indices) -> Generator[float, None, tuple[Indices, Indic
 
 
 def march(tetrahedra: Indices, values: Array) -> tuple[Indices, Indices]:
-    """Lattice edges (n, 2) that the surface crosses, and its triangles (m, 3) between these crossings."""
-    inside = values < 0.0
-    signs = inside[tetrahedra]
+    """Lattice edges (n, 2) that the surface crosses, and its triangles (m, 3) between these crossings.
+
+    tetrahedra : (k, 4), lattice points
+    values : at all lattice points, negative inside
+    """
+    signs = (values < 0.0)[tetrahedra]
     mixed = signs.any(axis=1) & ~signs.all(axis=1)
     tetrahedra, signs = tetrahedra[mixed], signs[mixed]
     case = signs @ (1 << np.arange(4))
-    table = _table()
-    corners = [tetrahedra[case == code][:, table[code]].reshape(-1, 2) for code in range(1, 15)]
-    ends = np.sort(np.concatenate(corners), axis=1)
-    keys = ends[:, 0] * len(values) + ends[:, 1]
+    corners = [tetrahedra[case == code][:, ends].reshape(-1, 2) for code, ends in _table().items()]
+    ends = np.concatenate(corners)
+    keys = ends.min(axis=1) * len(values) + ends.max(axis=1)
     distinct = _different(keys)
     crossed: Indices = np.stack(np.divmod(distinct, len(values)), axis=1)
     return crossed, np.searchsorted(distinct, keys).reshape(-1, 3)
@@ -87,8 +87,6 @@ def _table() -> dict[int, Indices]:
     A vertex lies on an edge, which is a pair of corners: (3 k, 2), three rows a triangle.
     """
     place = np.array([(-1, -1, -1), (1, -1, -1), (0, 1, -1), (0, 0, 1)], dtype=float)
-    if np.linalg.det(place[1:] - place[0]) < 0.0:
-        place[[0, 1]] = place[[1, 0]]
     found = {}
     for code in range(1, 15):
         ins = [i for i in range(4) if code >> i & 1]
@@ -108,12 +106,14 @@ def _table() -> dict[int, Indices]:
 
 
 def smoothed(vertices: Array, normal: Array, triangles: Indices) -> Array:
-    """Vertices moved along the surface, towards the mean of their neighbors; those of a border stay."""
+    """Vertices (n, 3) moved towards the mean of their neighbors, across their unit normals (n, 3).
+
+    Those on the border of the triangles (m, 3) stay.
+    """
     from scipy.sparse import coo_matrix
 
     a, b = triangles[:, [0, 1, 2]].ravel(), triangles[:, [1, 2, 0]].ravel()
-    n = len(vertices)
-    links = coo_matrix((np.ones(len(a)), (a, b)), (n, n)).tocsr()
+    links = coo_matrix((np.ones(len(a)), (a, b)), (len(vertices),) * 2).tocsr()
     border = np.asarray((abs(links - links.T)).sum(axis=1)).ravel() > 0.0
     links = links + links.T
     counts = np.asarray(links.sum(axis=1)).ravel()
@@ -123,28 +123,45 @@ def smoothed(vertices: Array, normal: Array, triangles: Indices) -> Array:
     return vertices + SMOOTHING_SHARE * move
 
 
+def keyed_sides(triangles: Indices, count: int) -> tuple[Indices, Indices]:
+    """The sides (3 m, 2) of triangles (m, 3) between `count` vertices, triangle by triangle.
+
+    Also numbers (3 m,) that are equal for the same edge, whichever way a triangle goes along it.
+    """
+    sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    return sides, sides.min(axis=1) * count + sides.max(axis=1)
+
+
 def sides_of(triangles: Indices, count: int) -> Indices:
-    """The different edges (n, 2) of triangles (m, 3) between `count` vertices."""
-    ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    keys = _different(ends.min(axis=1) * count + ends.max(axis=1))
-    return np.stack(np.divmod(keys, count), axis=1)
+    """The different edges (n, 2) of triangles (m, 3) between `count` vertices, the lower index first."""
+    _, keys = keyed_sides(triangles, count)
+    return np.stack(np.divmod(_different(keys), count), axis=1)
 
 
 def subdivided(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
     """Vertices (n, 3) and triangles (m, 3) with a vertex more in the middle of each edge."""
     sides = sides_of(triangles, len(vertices))
-    middles = vertices[sides].mean(axis=1)
-    return np.vstack([vertices, middles]), split_sides(triangles, sides, len(vertices))
+    return np.vstack([vertices, vertices[sides].mean(axis=1)]), split_sides(triangles, sides, len(vertices))
+
+
+def connected_pieces(i: Indices, j: Indices, count: int) -> tuple[int, Indices]:
+    """The number of connected components of a graph, and the one of each of `count` nodes, (count,).
+
+    i, j : (m,), the nodes that are linked, both ways
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    return connected_components(coo_matrix((np.ones(len(i)), (i, j)), (count, count)), directed=False)
 
 
 def split_sides(triangles: Indices, sides: Indices, new: int) -> Indices:
-    """Triangles with vertices new, new + 1, ... on sides (n, 2)."""
+    """Triangles (m, 3) split at vertices new, new + 1, ... on sides (n, 2), the lower index first."""
     if not len(sides):
         return triangles
     keys = sides[:, 0] * new + sides[:, 1]
     order = np.argsort(keys)
-    ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
-    wanted = ends[..., 0] * new + ends[..., 1]
+    wanted = keyed_sides(triangles, new)[1].reshape(-1, 3)
     at = np.minimum(np.searchsorted(keys[order], wanted), len(keys) - 1)
     middle = np.where(keys[order][at] == wanted, new + order[at], -1)
     halves = (middle >= 0).sum(axis=1)

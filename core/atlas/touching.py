@@ -12,15 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, number, unit_vector
 from ..contours.contour import Vector, along, cross, dot, scaled, tangent_of, vector_of
-from ..contours.finger import Surface, contact_of, first_contact
+from ..contours.finger import Surface, contact_of
 from ..contours.tracking import generator_of
 from ..exploration.one_touch import Exploration
 from ..exploration.options import ExplorationOptions
 from ..exploration.side_by_side import exploring_many
 from ..steps import part_of, result_of
+from ..triangles import row_dot
 from .borders import felt_border, snapped_to_border
 from .charts import Charts
-from .finger import FACING, Finger
+from .finger import FACING, finger_at
 from .frontier import Frontier
 from .join import Table, blend_heights, refit
 from .meshing import Mesh
@@ -143,24 +144,22 @@ class _Run:
         Where the point is on a crease or in a corner, a place near it makes a better patch.
         """
         p, n = vector_of(point), vector_of(up)
-        best, why = None, None
+        felt: list[tuple[Exploration, Vector, Vector]] = []
+        errors: list[ValueError] = []
         options = replace(self.options, farthest=FIRST_EXTENT * self.tolerance)
         for at, outward in self._places(p, n):
             (e,) = result_of(exploring_many(self.surface, [at], [outward], options))
             if isinstance(e, ValueError):
-                why = why or e
+                errors.append(e)
                 continue
-            if best is None or e.result.radius > best[0].result.radius:
-                best = e, at, outward
+            felt.append((e, at, outward))
             if e.result.radius >= GOOD * self.tolerance:
                 break
-        if best is None:
-            assert why is not None
-            raise why
-        first, at, outward = best
-        side = first_contact(self.surface, at, outward, tangent_of(outward, None), first.step)[2]
+        if not felt:
+            raise errors[0]
+        first, at, outward = max(felt, key=lambda each: each[0].result.radius)
         self.frontier = Frontier(
-            Finger(self.surface, side),
+            finger_at(self.surface, at, outward, first.step),
             NEAR * self.tolerance,
             np.pi * (SMALL * self.tolerance) ** 2,
             self.options.noise,
@@ -278,8 +277,9 @@ class _Run:
         yield 1.0
         uncovered = yield from self.frontier.uncovered(reference)
         places, taps = tuple(place for place, _ in uncovered), tuple(self.frontier.taps)
-        cut_short = self.done >= self.most
-        atlas = Atlas(patches, charts, reference, self.tolerance, places, check, taps, border, cut_short)
+        atlas = Atlas(
+            patches, charts, reference, self.tolerance, places, check, taps, border, self.done >= self.most
+        )
         off = atlas.improvable
         yield 1.0
         atlas = yield from atlas.widened()
@@ -319,11 +319,11 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
     aims[: CHECKS // 2] = centers[aimed]
     ways = (aims - middle - away)[: CHECKS // 2]
     # The triangle's own normal counts: that of a vertex on a crease is between those of its sheets.
-    ahead = np.einsum("ni,ni->n", reference.normals[aimed], ways)
+    ahead = row_dot(reference.normals[aimed], ways)
     facing = ahead < -STRAIGHT * np.linalg.norm(ways, axis=1)
     sharpest = np.argsort(np.where(reference.is_open, np.inf, reference.angles), kind="stable")[:SHARPEST]
     up = away[: len(sharpest)]
-    up = up * np.copysign(1.0, np.einsum("ni,ni->n", up, mesh.normals[sharpest]))[:, None]
+    up = up * np.copysign(1.0, row_dot(up, mesh.normals[sharpest]))[:, None]
     around = np.unique(reference.fans[sharpest[:SPIKES]])
     around = around[np.linalg.norm(reference.normals[around], axis=1) > STRAIGHT]  # The others have no area.
     down = far * reference.normals[around]

@@ -28,12 +28,9 @@ def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[RimPlace
     if unfelt is None or not reference.is_open.any():
         return tuple(found)
     rim, patch = mesh.vertices[reference.is_open], mesh.patch[reference.is_open]
-    surface_within_margin, missing = np.flatnonzero(mesh.patch >= 0), patch < 0
-    if missing.any():
-        nearest = cKDTree(
-            charts.origins if not len(surface_within_margin) else mesh.vertices[surface_within_margin]
-        ).query(rim[missing])[1]
-        patch[missing] = mesh.patch[surface_within_margin[nearest]] if len(surface_within_margin) else nearest
+    known, missing = np.flatnonzero(mesh.patch >= 0), patch < 0
+    nearest = cKDTree(mesh.vertices[known] if len(known) else charts.origins).query(rim[missing])[1]
+    patch[missing] = mesh.patch[known[nearest]] if len(known) else nearest
     ups = mesh.normals[reference.is_open]
     radii, areas = charts.radii[patch], _areas(unfelt)
     around = cKDTree(unfelt.vertices).query_ball_point(rim, radii)
