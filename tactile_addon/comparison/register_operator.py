@@ -16,7 +16,7 @@ from ... import core
 from ...core.arguments import many
 from ..probes import probe
 from ..probes.in_slices import InSlices, Progress
-from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, target_object
+from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, report_done, target_object
 from ..scene import patch_record
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.touch_report import Registration
@@ -152,8 +152,7 @@ class TACTILE_OT_register(InSlices, bpy.types.Operator):
 
     def _finish(self, context: bpy.types.Context) -> Outcome:
         found = self._search.put(self.pose)
-        self.report({"WARNING"} if found["is_ambiguous"] else {"INFO"}, registration_summary(found))
-        return {"FINISHED"}
+        return report_done(self, registration_summary(found), not found["is_ambiguous"])
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -15,7 +15,7 @@ from ...core.steps import result_of
 from ..probes import probe, touch_again
 from ..probes.change_handlers import is_pending
 from ..probes.in_slices import InSlices, Progress
-from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, target_object
+from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, report_done, target_object
 from ..scene import attributes, mesh_data, patch_record, shown
 from ..touch.surface import MeshSurface
 from ..touch.touch_report import TouchReport, judgment
@@ -165,8 +165,7 @@ class TACTILE_OT_verify(InSlices, bpy.types.Operator):
         record = self._verification.write()
         probe.patch_near(context.view_layer.objects.active).tactile_colors = "deviation"
         doubt, summary = verification_summary(record)
-        self.report({"WARNING"} if doubt else {"INFO"}, summary)
-        return {"FINISHED"}
+        return report_done(self, summary, not doubt)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

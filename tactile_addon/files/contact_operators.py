@@ -20,7 +20,7 @@ from bpy_extras.io_utils import ImportHelper
 from ... import core
 from ...core.arguments import many
 from ..probes.in_slices import InSlices, Progress
-from ..probes.operators import is_in_object_mode, make_active, report_error
+from ..probes.operators import is_in_object_mode, make_active, report_done, report_error
 from ..scene import patch_object
 from ..touch.settings import FitSettings, draw_chosen, draw_solver, length_property
 from ..touch.types import Outcome
@@ -147,12 +147,10 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
             solver=self.solver,
         )
         make_active(context, patch_object.insert(context.scene, touched))
-        report = touched.report
-        summary = fit_summary(report)
+        report, summary = touched.report, fit_summary(touched.report)
         if "misses" in report:
             summary += f"; curves miss their common point by {length(max(report['misses']))} at most"
-        self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, summary)
-        return {"FINISHED"}
+        return report_done(self, summary, report["status"] == "ok")
 
     def _begin(self, context: bpy.types.Context) -> None:
         self._object = measured.MeasuredObject(
@@ -172,8 +170,7 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
         report = self._object.report()
         made = whole_mesh.insert(context.scene, Path(self._paths[0]).name + more, self._object.whole, report)
         make_active(context, made)
-        self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, object_summary(report))
-        return {"FINISHED"}
+        return report_done(self, object_summary(report), report["status"] == "ok")
 
     def _given(self, name: str) -> list[float] | None:
         return list(getattr(self, name)) if self.properties.is_property_set(name) else None

@@ -66,11 +66,8 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         except ValueError as error:
             return report_error(self, error)
         touched = completed(touched)
-        patch = patch_object.insert(context.scene, touched)
-        make_active(context, patch)
-        report = touched.report
-        self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, fit_summary(report))
-        return {"FINISHED"}
+        make_active(context, patch_object.insert(context.scene, touched))
+        return report_done(self, fit_summary(touched.report), touched.report["status"] == "ok")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
@@ -88,6 +85,12 @@ def report_error(operator: bpy.types.Operator, error: Exception) -> Outcome:
     """Lets an operator report what is wrong, and returns what ends it."""
     operator.report({"ERROR"}, sentence(error))
     return {"CANCELLED"}
+
+
+def report_done(operator: bpy.types.Operator, words: str, is_good: bool = True) -> Outcome:
+    """Lets an operator report what it has done, as a warning unless that is good; returns what ends it."""
+    operator.report({"INFO"} if is_good else {"WARNING"}, words)
+    return {"FINISHED"}
 
 
 def target_object(context: bpy.types.Context, name: str) -> Object:

@@ -17,7 +17,7 @@ from ..touch.settings import MOST_PLANES, length_property
 from ..touch.types import Object, OperatorMixin, Outcome
 from ..touch.wording import added_planes, verdict
 from . import probe, touch_again
-from .operators import has_patch, is_in_object_mode, is_unlocked, polls, report_error, waiting
+from .operators import has_patch, is_in_object_mode, is_unlocked, polls, report_done, report_error, waiting
 
 SUBDIVISIONS = 3  # A target gets this many levels at once,
 MOST_FACES = 500_000  # as long as it has no more faces then.
@@ -89,8 +89,7 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
         touch_again.adopt(found, touched, depsgraph, complete=True)
         settings.is_probe = True
         unit = units.unit_of(context.scene, touched.result.radius)
-        self.report({"INFO"}, added_planes(touched.report, unit))
-        return {"FINISHED"}
+        return report_done(self, added_planes(touched.report, unit))
 
     def draw(self, context: bpy.types.Context) -> None:
         self.layout.use_property_split = True
@@ -168,14 +167,12 @@ class TACTILE_OT_add_subdivision(_ProbeOperator, bpy.types.Operator):
         _subdivide(target)
         context.view_layer.update()
         if whole is not None:
-            self.report({"INFO"}, f'"{target.name}" is subdivided: touch it all over again')
-            return {"FINISHED"}
+            return report_done(self, f'"{target.name}" is subdivided: touch it all over again')
         touch_again.refresh(found, context)
         if found.tactile_probe.message:
             return report_error(self, ValueError(found.tactile_probe.message))
         record = probe.record_of(found)
-        self.report({"INFO"}, verdict(record, units.unit_of(context.scene, record["radius"])))
-        return {"FINISHED"}
+        return report_done(self, verdict(record, units.unit_of(context.scene, record["radius"])))
 
 
 def _whole_object(context: bpy.types.Context) -> Any:
@@ -245,8 +242,7 @@ class TACTILE_OT_share_range(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> Outcome:
         patch = probe.patch_near(context.view_layer.objects.active)
         count = color_range.share(patch, context.view_layer.objects)
-        self.report({"INFO"}, f"One range of colors for {many(count, 'patch', 'patches')}")
-        return {"FINISHED"}
+        return report_done(self, f"One range of colors for {many(count, 'patch', 'patches')}")
 
 
 OPERATORS = (

@@ -13,6 +13,7 @@ from ..probes.operators import (
     has_target,
     is_in_object_mode,
     make_active,
+    report_done,
     target_object,
 )
 from ..scene import patch_record
@@ -90,8 +91,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         painted = map_object.insert(context, target, self._map)
         make_active(context, painted)
         record = painted[patch_record.MAP_RECORD].to_dict()
-        self.report({"INFO"} if record["patches"] else {"WARNING"}, map_summary(record))
-        return {"FINISHED"}
+        return report_done(self, map_summary(record), record["patches"] > 0)
 
     def _about(self, context: bpy.types.Context) -> str:
         """A sentence on what will be touched at how many points, or on why it cannot be touched."""

@@ -12,6 +12,7 @@ from ..probes.operators import (
     has_mesh,
     is_in_object_mode,
     make_active,
+    report_done,
     report_error,
     target_object,
 )
@@ -77,8 +78,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         if context.area is None or context.area.type != "VIEW_3D":
-            self.report({"ERROR"}, "Points are picked in a 3D viewport: start the pick there")
-            return {"CANCELLED"}
+            return report_error(self, ValueError("Points are picked in a 3D viewport: start the pick there"))
         active = context.view_layer.objects.active
         if active is not None and active.type == "MESH":
             show_size(max(active.dimensions[:]))
@@ -166,8 +166,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         show_size(touched.surface.size)
         report = probe.record_of(found)
         unit = units.unit_of(context.scene, report["radius"])
-        self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, verdict(report, unit))
-        return {"FINISHED"}
+        return report_done(self, verdict(report, unit), report["status"] == "ok")
 
     def _touch(self, context: bpy.types.Context, target: Object, depsgraph: bpy.types.Depsgraph) -> Touched:
         given = self.properties.is_property_set

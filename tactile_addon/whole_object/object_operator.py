@@ -15,6 +15,7 @@ from ..probes.operators import (
     has_target,
     is_in_object_mode,
     make_active,
+    report_done,
     target_object,
 )
 from ..scene import patch_record
@@ -144,8 +145,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         kept.keep(made, self._touches)
         make_active(context, made)
         record = made[patch_record.ATLAS_RECORD].to_dict()
-        self.report({"INFO"} if record["status"] == "ok" else {"WARNING"}, object_summary(record))
-        return {"FINISHED"}
+        return report_done(self, object_summary(record), record["status"] == "ok")
 
     def _about(self, context: bpy.types.Context) -> str:
         """What it will take, in a sentence, or why the object cannot be touched."""

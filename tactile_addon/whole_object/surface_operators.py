@@ -10,7 +10,7 @@ from mathutils import Vector
 
 from ..probes.in_slices import InSlices, Progress
 from ..probes.number_fields import dragged, fields
-from ..probes.operators import is_in_object_mode, make_active, polls, report_error
+from ..probes.operators import is_in_object_mode, make_active, polls, report_done, report_error
 from ..scene import patch_record
 from ..scene.mesh_data import own_mesh
 from ..touch.arrays import read_array
@@ -134,8 +134,7 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
         source = obj[patch_record.ATLAS_RECORD]["source"]
         whole_mesh.rewrite(obj, self._touches.whole, self._touches.report() | {"source": source})
         kept.keep(obj, self._touches)
-        self.report({"INFO"}, object_summary(obj[patch_record.ATLAS_RECORD].to_dict()))
-        return {"FINISHED"}
+        return report_done(self, object_summary(obj[patch_record.ATLAS_RECORD].to_dict()))
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
