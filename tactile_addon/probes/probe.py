@@ -193,14 +193,12 @@ def record_of(obj: Object) -> TouchReport | None:
 
 def require_unlocked(obj: Object) -> None:
     """Raises ValueError if anything of the probe or patch near `obj` cannot be changed."""
-    patch = patch_near(obj)
-    lines = None if patch is None else patch_record.contours_of(patch)
-    for each in (probe_of(obj), patch, lines):
-        if each is not None and not each.is_editable:
+    for each in filter(None, (probe_of(obj), *patch_record.parts_of(patch_near(obj)))):
+        if not each.is_editable:
             raise ValueError(
                 f'"{each.name}" comes from a library: make it local, or override it, to change it'
             )
-        if each is not None and each.type == "MESH" and each.data.is_editmode:
+        if each.type == "MESH" and each.data.is_editmode:
             raise ValueError(f'"{each.name}" is being edited: leave its Edit Mode first')
 
 

@@ -202,9 +202,7 @@ class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
-        patch = probe.patch_of(found)
-        lines = None if patch is None else patch_record.contours_of(patch)
-        patch_object.remove_objects(list(filter(None, (lines, patch, found))))
+        patch_object.remove_objects([*patch_record.parts_of(probe.patch_of(found)), found])
         return {"FINISHED"}
 
 

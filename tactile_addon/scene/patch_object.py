@@ -25,6 +25,7 @@ from .patch_record import (
     _place_contours,
     contours_of,
     matrix_of,
+    parts_of,
     place,
 )
 from .shown import recolor, settle
@@ -87,7 +88,7 @@ def remove_meshes(meshes: Iterable[bpy.types.Mesh]) -> None:
 def rewrite(patch: Object, touched: Touched) -> None:
     """Changes the patch, and its contours if they are still there, to those of another touch, in place."""
     lines = contours_of(patch)
-    for obj in filter(None, (patch, lines)):
+    for obj in parts_of(patch):
         own_mesh(obj)
     if touched.report["is_verified"] or PLACE not in patch.data.attributes:
         _fill_patch(patch, touched)
@@ -99,7 +100,7 @@ def rewrite(patch: Object, touched: Touched) -> None:
         _place_contours(lines)
         names["contours"] = lines.name
     place(patch, Matrix(matrix_of(touched.result.frame.axes, touched.result.frame.origin).tolist()))
-    for obj in filter(None, (patch, lines)):
+    for obj in parts_of(patch):
         obj[ABOVE] = _above(patch, touched)
     patch[RECORD] = touched.report | names
     patch.pop(RECONSTRUCTION, None)
@@ -121,8 +122,7 @@ def _above(patch: Object, touched: Touched) -> float:
 
 def meshes(patch: Object | None) -> list[bpy.types.Mesh]:
     """The meshes of a patch object and of its contours; an empty list if `patch` is None."""
-    objects = [] if patch is None else [patch, contours_of(patch)]
-    return [obj.data for obj in objects if obj is not None]
+    return [obj.data for obj in parts_of(patch)]
 
 
 def collection(scene: bpy.types.Scene) -> bpy.types.Collection:

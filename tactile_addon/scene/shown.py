@@ -21,8 +21,8 @@ from .patch_record import (
     POWERS,
     RANGE,
     RECORD,
-    contours_of,
     is_colored,
+    parts_of,
 )
 
 # The range of colors is no smaller, so that a plane is pale green: in units of the radius, and for a patch's
@@ -119,7 +119,7 @@ def _draw_above(patch: Object, others: list[Object]) -> None:
         below = [each for each in (patch, *others) if each.get(LAYER, 0) < obj[LAYER]]
         below = [each for each in below if _overlap(obj[RECORD], each[RECORD])]
         height = max((_height(each) + _layer(obj, each) for each in below), default=_above_surfaces(obj))
-        for part in filter(None, (obj, contours_of(obj))):
+        for part in parts_of(obj):
             _lift(part, height)
 
 
