@@ -22,7 +22,7 @@ from ...core.arguments import many
 from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import is_in_object_mode, make_active, report_done, report_error
 from ..scene import patch_object
-from ..touch.settings import FitSettings, draw_chosen, draw_solver, length_property
+from ..touch.settings import FitSettings, draw_chosen, draw_solver, given, length_property
 from ..touch.types import Outcome
 from ..touch.units import length
 from ..touch.wording import fit_summary
@@ -134,8 +134,8 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
         touched = measured.fit(
             Path(self._paths[0]).name,
             self._contacts,
-            point=json.loads(self.exact_point) if self.exact_point else self._given("point"),
-            outward=self._given("outward"),
+            point=json.loads(self.exact_point) if self.exact_point else given(self, "point"),
+            outward=given(self, "outward"),
             flip=self.flip,
             all_strokes=self.strokes,
             radius=self.radius,
@@ -155,7 +155,7 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
     def _begin(self, context: bpy.types.Context) -> None:
         self._object = measured.MeasuredObject(
             self._contacts,
-            outward=self._given("outward"),
+            outward=given(self, "outward"),
             flip=self.flip,
             tolerance=self.tolerance,
             noise=self.noise,
@@ -171,9 +171,6 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
         made = whole_mesh.insert(context.scene, Path(self._paths[0]).name + more, self._object.whole, report)
         make_active(context, made)
         return report_done(self, object_summary(report), report["status"] == "ok")
-
-    def _given(self, name: str) -> list[float] | None:
-        return list(getattr(self, name)) if self.properties.is_property_set(name) else None
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

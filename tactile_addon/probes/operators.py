@@ -9,16 +9,7 @@ from typing import Any
 import bpy
 
 from ..scene import patch_object, patch_record
-from ..touch.settings import (
-    LOCATION,
-    OUTWARD,
-    TARGET,
-    UNSAVED,
-    TouchSettings,
-    draw_all,
-    length_property,
-    touch_arguments,
-)
+from ..touch.settings import UNSAVED, PlacedTouch, draw_all, given, length_property, touch_arguments
 from ..touch.touch_object import completed, touch
 from ..touch.types import Object, Outcome
 from ..touch.wording import fit_summary, sentence
@@ -28,16 +19,13 @@ from .probe import is_result, lock_of, patch_near, probe_of, record_of
 NO_MESH = "There is no mesh to touch: add one (Shift A), or import a scan (File > Import)"
 
 
-class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
+class TACTILE_OT_reconstruct(PlacedTouch, bpy.types.Operator):
     """Feel the surface along curves through a point and rebuild the patch around it"""
 
     bl_idname = "tactile.reconstruct"
     bl_label = "Fit Tactile Patch"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
-    target: TARGET
-    location: LOCATION
-    outward: OUTWARD
     tolerance: length_property(
         "Tolerance",
         "Add planes until the height is accurate to this or no plane would help; if not set, add none",
@@ -51,16 +39,14 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         return has_target(cls, context)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
-        given = self.properties.is_property_set
-        depsgraph = context.evaluated_depsgraph_get()
         try:
             with waiting(context):
                 touched = touch(
                     target_object(context, self.target),
-                    depsgraph,
-                    list(self.location) if given("location") else context.scene.cursor.location.to_tuple(),
-                    outward=list(self.outward) if given("outward") else None,
-                    tolerance=self.tolerance if given("tolerance") else None,
+                    context.evaluated_depsgraph_get(),
+                    given(self, "location") or context.scene.cursor.location.to_tuple(),
+                    outward=given(self, "outward"),
+                    tolerance=self.tolerance if self.properties.is_property_set("tolerance") else None,
                     **touch_arguments(self),
                 )
         except ValueError as error:
@@ -77,8 +63,8 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         for name in filter(self.properties.is_property_set, ("location", "outward")):
             layout.prop(self, name)
         draw_all(layout, self)
-        given = self.properties.is_property_set("tolerance")
-        layout.prop(self, "tolerance", text="Tolerance" if given else "Tolerance (Off)")
+        is_set = self.properties.is_property_set("tolerance")
+        layout.prop(self, "tolerance", text="Tolerance" if is_set else "Tolerance (Off)")
 
 
 def report_error(operator: bpy.types.Operator, error: Exception) -> Outcome:

@@ -21,13 +21,11 @@ from ..scene.viewports import show_colors, show_size
 from ..stability_map.map_object import inputs_of, touched_near
 from ..touch import units
 from ..touch.settings import (
-    LOCATION,
     NAMES,
-    OUTWARD,
-    TARGET,
     UNSAVED,
-    TouchSettings,
+    PlacedTouch,
     draw_all,
+    given,
     touch_arguments,
 )
 from ..touch.touch_object import Touched, touch
@@ -46,16 +44,13 @@ HINTS = (
 )
 
 
-class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
+class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
     """Click on a mesh: a probe there feels the surface and keeps a patch of it up to date"""
 
     bl_idname = "tactile.pick"
     bl_label = "Pick Reference Point"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
-    target: TARGET
-    location: LOCATION
-    outward: OUTWARD
     new: BoolProperty(
         name="New Probe",
         description="Make a new probe instead of moving the active one",
@@ -169,12 +164,11 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         return report_done(self, verdict(report, unit), report["status"] == "ok")
 
     def _touch(self, context: bpy.types.Context, target: Object, depsgraph: bpy.types.Depsgraph) -> Touched:
-        given = self.properties.is_property_set
         return touch(
             target,
             depsgraph,
-            list(self.location) if given("location") else context.scene.cursor.location.to_tuple(),
-            toward=list(self.outward) if given("outward") else None,
+            given(self, "location") or context.scene.cursor.location.to_tuple(),
+            toward=given(self, "outward"),
             **touch_arguments(self),
         )
 
@@ -192,13 +186,13 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         Raises ValueError if the probe cannot be changed.
         """
         active: Object = context.view_layer.objects.active
-        moved, given = None if self.new else probe.probe_of(active), {}
+        moved, inputs = None if self.new else probe.probe_of(active), {}
         if moved is not None:
             probe.require_unlocked(moved)
-            given = {name: getattr(moved.tactile_probe, name) for name in NAMES}
+            inputs = {name: getattr(moved.tactile_probe, name) for name in NAMES}
         elif active is not None and patch_record.MAP_RECORD in active:
-            given = inputs_of(active)
-        for name, value in given.items():
+            inputs = inputs_of(active)
+        for name, value in inputs.items():
             if not self.properties.is_property_set(name):
                 setattr(self, name, value)
         return moved

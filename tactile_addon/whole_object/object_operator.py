@@ -19,7 +19,7 @@ from ..probes.operators import (
     target_object,
 )
 from ..scene import patch_record
-from ..touch.settings import NOISE, TARGET, UNSAVED, draw_chosen, length_property
+from ..touch.settings import NOISE, TARGET, UNSAVED, draw_chosen, given, length_property
 from ..touch.types import Outcome
 from ..touch.wording import sentence
 from . import kept, whole_mesh
@@ -93,7 +93,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
 
     def _begin(self, context: bpy.types.Context) -> None:
         target, found = target_object(context, self.target), probe.probe_of(context.view_layer.objects.active)
-        location = list(self.location) if self.properties.is_property_set("location") else None
+        location = given(self, "location")
         if location is None and found is not None and found.tactile_probe.target == target:
             location = list(found.matrix_world.translation)
         self._touches = ObjectTouches(
