@@ -11,6 +11,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ...core.triangles import triangle_cross
 from ..scene.colors import symmetric_range
 from ..touch import units
 from ..touch.arrays import read_array
@@ -49,14 +50,10 @@ def bands(
         return name, units.say(reach, 1, unit), f"{100.0 * within:.1f} %", due
 
     rows = [row(*reach) for reach in reaches]
-    for count, due in NORMAL_SHARES:
-        rows.append(
-            row(
-                f"± {count:g} standard deviation{'s' if count > 1.0 else ''}",
-                count * std,
-                f"{100.0 * due:g} %",
-            )
-        )
+    rows += [
+        row(f"± {count:g} standard deviation{'s' if count > 1.0 else ''}", count * std, f"{100.0 * due:g} %")
+        for count, due in NORMAL_SHARES
+    ]
     return page.table(rows, ("band", "", "within it", "expected, if normal"))
 
 
@@ -106,6 +103,5 @@ def corners(mesh: bpy.types.Mesh) -> Array:
 
 def vertex_areas(points: Array, triangles: Array) -> Array:
     """A third of the area (n,) of the triangles (m, 3) at each of points (n, 3)."""
-    a, b, c = (points[triangles[:, i]] for i in range(3))
-    thirds = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
+    thirds = np.linalg.norm(triangle_cross(points[triangles]), axis=1) / 6.0
     return np.bincount(triangles.ravel(), np.repeat(thirds, 3), len(points))

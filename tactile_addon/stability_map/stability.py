@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from ... import core
+from ...core.triangles import triangle_cross
 from ..scene.attributes import MEASURES
 from ..touch.arrays import read_array
 from ..touch.detached_mesh import DetachedMesh
@@ -138,9 +139,8 @@ class StabilityMap:
         tree = cKDTree(self.places[: self.done])
         self.touch_of = np.empty(len(points), dtype=np.intp)
         for start in range(0, len(points), NEAREST_AT_ONCE):
-            self.touch_of[start : start + NEAREST_AT_ONCE] = tree.query(
-                points[start : start + NEAREST_AT_ONCE]
-            )[1]
+            some = slice(start, start + NEAREST_AT_ONCE)
+            self.touch_of[some] = tree.query(points[some])[1]
             yield
         # Touches in narrow faces would color wide ones that share all vertices with them, as on a plate.
         touch = np.full(len(self._areas), -1)
@@ -234,8 +234,7 @@ def _faces(surface: DetachedMesh) -> tuple[Array, Array]:
     The middle is within a face even if that is concave. Of equal triangles, as in a quad, it is the first.
     """
     corners, owners = surface.points[surface.triangles], surface.owners
-    a, b, c = corners.swapaxes(0, 1)
-    areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    areas = 0.5 * np.linalg.norm(triangle_cross(corners), axis=1)
     most = np.maximum.reduceat(areas, np.flatnonzero(np.diff(owners, prepend=-1)))
     large = np.flatnonzero(areas >= (1.0 - EQUAL) * most[owners])
     first = large[np.diff(owners[large], prepend=-1) != 0]
