@@ -38,16 +38,16 @@ def object_page(obj: Object) -> str:
 
 
 def _pictures(mesh: bpy.types.Mesh, unit: Unit, shown: str) -> str:
-    shown_values = values(mesh, shown).astype(float)
-    limit = symmetric_range(shown_values, parts.LEAST_RANGE)
+    found = values(mesh, shown)
+    limit = symmetric_range(found, parts.LEAST_RANGE)
     low = 0.0 if shown in patch_record.POSITIVE else -1.0
     scale = page.figure(drawing.scale(limit, parts.label(1, unit), low), SCALE_WORDS[shown])
-    return page.section("Pictures", *views.three_sides(mesh, shades(shown_values, limit)), scale)
+    return page.section("Pictures", *views.three_sides(mesh, shades(found, limit)), scale)
 
 
 def _deviations(mesh: bpy.types.Mesh, record: Mapping[str, Any]) -> list[str]:
-    unit, off = unit_of(record), values(mesh, DEVIATION).astype(float)
-    areas = parts.vertex_areas(values(mesh, POSITION).astype(float), parts.corners(mesh))
+    unit, off = unit_of(record), values(mesh, DEVIATION)
+    areas = parts.vertex_areas(values(mesh, POSITION), parts.corners(mesh))
     reaches = [(f"± {times:g} × the tolerance", times * record["tolerance"]) for times in TOLERANCES]
     words = "Shares of the area by its distance from the mesh. The outermost bars count all larger distances."
     return [
