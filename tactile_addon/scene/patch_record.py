@@ -59,8 +59,8 @@ def report_of(patch: Object) -> TouchReport | None:
     return report if good and numbers[0] > 0.0 and all(isinstance(word, str) for word in words) else None
 
 
-def extent_of(patch: Object) -> float:
-    """The extent in the report of a patch, which need not be complete; 0 if there is none."""
+def extent_of(patch: Object | None) -> float:
+    """The extent in the report of a patch, which need not be complete; 0 if there is no patch or extent."""
     try:
         extent = patch[RECORD]["extent"]
     except (KeyError, TypeError):
