@@ -10,7 +10,7 @@ import bpy
 from ..scene import patch_record
 from ..scene.attributes import DEVIATION, POSITION
 from ..scene.colors import shades, symmetric_range
-from ..scene.mesh_data import values
+from ..scene.mesh_data import corners_of, values
 from ..touch.types import Object
 from ..touch.units import Unit
 from ..whole_object.object_report import object_summary, object_table_rows, unit_of
@@ -47,7 +47,7 @@ def _pictures(mesh: bpy.types.Mesh, unit: Unit, shown: str) -> str:
 
 def _deviations(mesh: bpy.types.Mesh, record: Mapping[str, Any]) -> list[str]:
     unit, off = unit_of(record), values(mesh, DEVIATION)
-    areas = parts.vertex_areas(values(mesh, POSITION), parts.corners(mesh))
+    areas = parts.vertex_areas(values(mesh, POSITION), corners_of(mesh))
     reaches = [(f"± {times:g} × the tolerance", times * record["tolerance"]) for times in TOLERANCES]
     words = "Shares of the area by its distance from the mesh. The outermost bars count all larger distances."
     return [

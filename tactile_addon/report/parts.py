@@ -14,7 +14,6 @@ import numpy as np
 from ...core.triangles import triangle_cross
 from ..scene.colors import symmetric_range
 from ..touch import units
-from ..touch.arrays import read_array
 from ..touch.types import Array
 from ..touch.units import Unit
 from . import drawing, page
@@ -94,11 +93,6 @@ def _versions() -> list[tuple[str, str]]:
         ("numpy", np.__version__),
         ("scipy", scipy.__version__),
     ]
-
-
-def corners(mesh: bpy.types.Mesh) -> Array:
-    """The triangles (m, 3) of a mesh that has no other faces."""
-    return read_array(mesh.loops, "vertex_index", dtype=np.int32).reshape(-1, 3)
 
 
 def vertex_areas(points: Array, triangles: Array) -> Array:

@@ -12,7 +12,7 @@ from ... import core
 from ..scene import patch_record
 from ..scene.attributes import DEVIATION, POSITION
 from ..scene.colors import shades, symmetric_range
-from ..scene.mesh_data import values
+from ..scene.mesh_data import corners_of, values
 from ..touch import units
 from ..touch.types import Array, Object
 from ..touch.units import Unit
@@ -44,7 +44,7 @@ def patch_page(patch: Object, r: core.Reconstruction) -> str:
 
 
 def _pictures(patch: Object, r: core.Reconstruction, record: Mapping[str, Any], unit: Unit) -> Iterator[str]:
-    points, corners = values(patch.data, POSITION), parts.corners(patch.data)
+    points, corners = values(patch.data, POSITION), corners_of(patch.data)
     contacts = r.contacts[:, :2] * record["radius"] / r.radius  # The object's mesh has this scale.
     for attribute, title, power in SHOWN if _has_mesh(record) else SHOWN[:-1]:
         shown, low = values(patch.data, attribute), 0.0 if attribute in patch_record.POSITIVE else -1.0
@@ -62,7 +62,7 @@ def _has_mesh(record: Mapping[str, Any]) -> bool:
 def _deviations(patch: Object, r: core.Reconstruction, record: Mapping[str, Any]) -> tuple[Array, Array, str]:
     """Signed distances (n,) of the patch from mesh or contacts, their weights (n,), and words for them."""
     if _has_mesh(record):
-        points, corners = values(patch.data, POSITION), parts.corners(patch.data)
+        points, corners = values(patch.data, POSITION), corners_of(patch.data)
         words = "Shares of the patch's area by its distance from the mesh."
         return values(patch.data, DEVIATION), parts.vertex_areas(points, corners), f"{words} {OUTERMOST}"
     x, y, z = r.contacts.T
