@@ -205,8 +205,7 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         text = f"Largest Deviation: {deviation(record, 'max')}"
         layout.operator(TACTILE_OT_look_farthest.bl_idname, text=text, icon="ZOOM_SELECTED", translate=False)
         layout.operator(TACTILE_OT_mesh_again.bl_idname, icon="MOD_REMESH")
-        row = layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Surface", icon="EYEDROPPER")
-        row.new = True
+        layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Surface", icon="EYEDROPPER").new = True
 
 
 class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
