@@ -98,6 +98,12 @@ def target_object(context: bpy.types.Context, name: str) -> Object:
     return obj
 
 
+def surface_of(context: bpy.types.Context) -> Object | None:
+    """The active object if it is a whole object, or None."""
+    obj: Object = context.view_layer.objects.active
+    return obj if obj is not None and patch_record.ATLAS_RECORD in obj else None
+
+
 def fields_of(context: bpy.types.Context, name: str) -> dict[str, str]:
     """The properties by which an operator shows lengths for the object it touches, see number_fields."""
     try:

@@ -17,7 +17,16 @@ from ..touch.settings import MOST_PLANES, length_property
 from ..touch.types import Object, OperatorMixin, Outcome
 from ..touch.wording import added_planes, verdict
 from . import probe, touch_again
-from .operators import has_patch, is_in_object_mode, is_unlocked, polls, report_done, report_error, waiting
+from .operators import (
+    has_patch,
+    is_in_object_mode,
+    is_unlocked,
+    polls,
+    report_done,
+    report_error,
+    surface_of,
+    waiting,
+)
 
 SUBDIVISIONS = 3  # A target gets this many levels at once,
 MOST_FACES = 500_000  # as long as it has no more faces then.
@@ -30,9 +39,9 @@ class _ProbeOperator(OperatorMixin):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        active = probe.probe_of(context.view_layer.objects.active)
+        found = probe.probe_of(context.view_layer.objects.active)
         return (
-            polls(cls, active, "Select a probe, or pick a reference point first")
+            polls(cls, found, "Select a probe, or pick a reference point first")
             and is_in_object_mode(cls, context, "Probes are changed")
             and is_unlocked(cls, context)
         )
@@ -155,30 +164,27 @@ class TACTILE_OT_add_subdivision(_ProbeOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if _whole_object(context) is None:
+        if surface_of(context) is None:
             return super().poll(context)
         return is_in_object_mode(cls, context, "Modifiers are added")
 
     def execute(self, context: bpy.types.Context) -> Outcome:
-        found, whole = probe.probe_of(context.view_layer.objects.active), _whole_object(context)
-        target = found.tactile_probe.target if whole is None else bpy.data.objects.get(whole["source"])
+        found, surface = probe.probe_of(context.view_layer.objects.active), surface_of(context)
+        if surface is None:
+            target = found.tactile_probe.target
+        else:
+            target = bpy.data.objects.get(surface[patch_record.ATLAS_RECORD]["source"])
         if target is None or not target.is_editable:
             return report_error(self, ValueError("The target cannot be changed: make it local first"))
         _subdivide(target)
         context.view_layer.update()
-        if whole is not None:
+        if surface is not None:
             return report_done(self, f'"{target.name}" is subdivided: touch it all over again')
         touch_again.refresh(found, context)
         if found.tactile_probe.message:
             return report_error(self, ValueError(found.tactile_probe.message))
         record = probe.record_of(found)
         return report_done(self, verdict(record, units.unit_of(context.scene, record["radius"])))
-
-
-def _whole_object(context: bpy.types.Context) -> Any:
-    """The report of the active object if it is a whole object, or None."""
-    active = context.view_layer.objects.active
-    return None if active is None else active.get(patch_record.ATLAS_RECORD)
 
 
 def _subdivide(target: Object) -> None:

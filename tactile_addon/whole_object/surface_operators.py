@@ -10,22 +10,17 @@ from mathutils import Vector
 
 from ..probes.in_slices import InSlices, Progress
 from ..probes.number_fields import dragged, fields
-from ..probes.operators import is_in_object_mode, make_active, polls, report_done, report_error
+from ..probes.operators import is_in_object_mode, make_active, polls, report_done, report_error, surface_of
 from ..scene import patch_record
 from ..scene.mesh_data import own_mesh
 from ..touch.arrays import read_array
-from ..touch.settings import draw_chosen, length_property
+from ..touch.settings import draw_chosen
 from ..touch.types import Object, Outcome, Point
 from . import kept, whole_mesh
+from .object_operator import EDGE
 from .object_report import object_summary
 
 SEEN = 0.4  # The view is as wide as this share of the object's size.
-
-
-def surface_of(context: bpy.types.Context) -> Object | None:
-    """The active object if it is a whole object, or None."""
-    obj: Object = context.view_layer.objects.active
-    return obj if obj is not None and patch_record.ATLAS_RECORD in obj else None
 
 
 class TACTILE_OT_look_farthest(bpy.types.Operator):
@@ -83,11 +78,7 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
     bl_label = "Change Edge Length"
     bl_options = {"UNDO"}
 
-    edge: length_property(
-        "Edge Length",
-        "Length of the edges of the surface's triangles, at most about a quarter of the thinnest wall; 0 "
-        "chooses it by the curvature",
-    )
+    edge: EDGE
 
     stop = "Keep It as It Was"
     stopped = "Stopped: the surface stays as it was"
@@ -131,8 +122,8 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
 
     def _finish(self, context: bpy.types.Context) -> Outcome:
         obj = self._object(context)
-        source = obj[patch_record.ATLAS_RECORD]["source"]
-        whole_mesh.rewrite(obj, self._touches.whole, self._touches.report() | {"source": source})
+        report = self._touches.report() | {"source": obj[patch_record.ATLAS_RECORD]["source"]}
+        whole_mesh.rewrite(obj, self._touches.whole, report)
         kept.keep(obj, self._touches)
         return report_done(self, object_summary(obj[patch_record.ATLAS_RECORD].to_dict()))
 
