@@ -27,7 +27,7 @@ may differ afterward.
                      and touches then if there was no time before
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import bpy
@@ -42,7 +42,7 @@ from bpy.props import (
 
 from ... import core
 from ..scene import patch_object, patch_record, shown
-from ..scene.family import children_of
+from ..scene.family import all_objects, children_of
 from ..touch.settings import OVERRIDABLE, FitSettings, TouchSettings, changed, is_silent
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object
@@ -106,8 +106,7 @@ def targets() -> set[int]:
     """The session_uids of the targets of all probes in this file; 0 for a probe without target."""
     global _targets
     if _targets is None:
-        objects: Iterable[Object] = bpy.data.objects
-        of = (obj.tactile_probe.target for obj in objects if is_probe(obj))
+        of = (obj.tactile_probe.target for obj in all_objects() if is_probe(obj))
         _targets = {0 if target is None else target.session_uid for target in of}
     return _targets
 

@@ -3,7 +3,7 @@
 """How a probe touches again: the inputs of its patch, whether these have changed, and the new patch."""
 
 import hashlib
-from collections.abc import Container, Iterable
+from collections.abc import Container
 from typing import Any
 
 import bpy
@@ -11,6 +11,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..scene import patch_object, patch_record
+from ..scene.family import all_objects
 from ..touch.evaluated_mesh import checksum_of, is_disabled, require_invertible
 from ..touch.settings import touch_arguments
 from ..touch.touch_object import Touched, completed, touch
@@ -106,8 +107,7 @@ def stand_by(probe: Object, outdated: bool, complete: bool) -> None:
 
 def _left_contours(probe: Object) -> Object | None:
     """The contours of a patch that was deleted, if they are still there, or None."""
-    objects: Iterable[Object] = bpy.data.objects
-    left = (obj for obj in objects if patch_record.CONTOURS in obj and obj.parent is None)
+    left = (obj for obj in all_objects() if patch_record.CONTOURS in obj and obj.parent is None)
     own = (obj for obj in left if obj.is_editable and obj.data is not None)
     return next((obj for obj in own if obj.data.get(DIGEST) == _signed(probe.tactile_probe)[0]), None)
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The children of objects. Blender looks through all objects for those of one; this looks once for many."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 import bpy
@@ -12,6 +12,11 @@ from ..touch.types import Object
 _remembered: dict[Object, list[Object]] | None = (
     None  # Within `remembered`, the children by their parents; empty until it is needed.
 )
+
+
+def all_objects() -> Iterable[Object]:
+    """All objects of the file, with the custom properties that Blender's stubs do not know."""
+    return bpy.data.objects
 
 
 def children_of(obj: Object) -> list[Object]:
