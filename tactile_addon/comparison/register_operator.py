@@ -8,7 +8,6 @@ from time import perf_counter
 from typing import Any
 
 import bpy
-import numpy as np
 from bpy.props import IntProperty, StringProperty
 from mathutils import Matrix
 
@@ -83,12 +82,11 @@ class Search:
         if pose > len(self.poses):
             poses = many(len(self.poses), "pose", "poses")
             raise ValueError(f'The search has found {poses} on "{self.target}": choose a lower number')
-        chosen, matrix = self.poses[pose - 1], np.eye(4)
         patch: Object = bpy.data.objects.get(self.patch)
         if patch is None:
             raise ValueError(f'"{self.patch}" was deleted while its place was searched for')
-        matrix[:3, :3], matrix[:3, 3] = chosen.rotation, chosen.translation
-        patch.matrix_world = Matrix(matrix.tolist()) @ self._matrix
+        motion = patch_record.matrix_of(self.poses[pose - 1].rotation, self.poses[pose - 1].translation)
+        patch.matrix_world = Matrix(motion.tolist()) @ self._matrix
         patch[patch_record.RECORD]["registration"] = {
             "target": self.target,
             "pose": pose,
