@@ -81,43 +81,34 @@ def _give_back_meshes() -> None:
 
 def put_back() -> None:
     """Links again what is still there. It must be called after undo and redo, and in another file."""
+    datablocks: Iterable[Any] = (*bpy.data.objects, *bpy.data.meshes) if _links else ()
+    there = {block.session_uid: block for block in datablocks} | _collections()
     for function, *numbers in reversed(_links):
-        function(*numbers)
+        if all(number in there for number in numbers):
+            function(*(there[number] for number in numbers))
     _links.clear()
     _added.clear()
     _replaced.clear()
 
 
-def _set_mesh(obj: int, copy: int, before: int) -> None:
-    owner, mesh = _object(obj), _found(bpy.data.meshes, copy)
-    if owner is not None and mesh is not None and owner.data.session_uid == before:
-        owner.data = mesh
+def _set_mesh(obj: Object, copy: bpy.types.Mesh, before: bpy.types.Mesh) -> None:
+    if obj.data == before:
+        obj.data = copy
 
 
-def _set_parent(child: int, parent: int) -> None:
-    below, above = _object(child), _object(parent)
-    if below is not None and above is not None and below.parent is None:
-        below.parent = above
+def _set_parent(child: Object, parent: Object) -> None:
+    if child.parent is None:
+        child.parent = parent
 
 
-def _link_object(obj: int, collection: int) -> None:
-    found, above = _object(obj), _collections().get(collection)
-    if found is not None and above is not None and not found.users_collection:
-        above.objects.link(found)
+def _link_object(obj: Object, collection: bpy.types.Collection) -> None:
+    if not obj.users_collection:
+        collection.objects.link(obj)
 
 
-def _link_collection(collection: int, above: int) -> None:
-    child, parent = _collections().get(collection), _collections().get(above)
-    if child is not None and parent is not None and child.name not in parent.children:
-        parent.children.link(child)
-
-
-def _object(number: int) -> Object | None:
-    return _found(bpy.data.objects, number)
-
-
-def _found(datablocks: Iterable[Any], number: int) -> Any:
-    return next((block for block in datablocks if block.session_uid == number), None)
+def _link_collection(collection: bpy.types.Collection, above: bpy.types.Collection) -> None:
+    if collection.name not in above.children:
+        above.children.link(collection)
 
 
 def _collections() -> dict[int, bpy.types.Collection]:
