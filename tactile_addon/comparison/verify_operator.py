@@ -174,8 +174,11 @@ def chosen_mesh(context: bpy.types.Context, patch: Object) -> str:
 
     Raises ValueError if there is none, or if several meshes are selected.
     """
-    selected = context.view_layer.objects.selected
-    names = [obj.name for obj in selected if obj.type == "MESH" and not probe.is_result(obj)]
+    names = [
+        obj.name
+        for obj in context.view_layer.objects.selected
+        if obj.type == "MESH" and not probe.is_result(obj)
+    ]
     if len(names) > 1:
         raise ValueError(
             f"{len(names)} meshes are selected: select one besides the patch, or none to compare "

@@ -176,8 +176,7 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
         of_patch = "point", "strokes", "radius", "flip", "noise", "normal_std"
-        of_object = "outward", "flip", "noise"
-        for name in ("unit", "whole", *(of_object if self.whole else of_patch)):
+        for name in ("unit", "whole", *(("outward", "flip", "noise") if self.whole else of_patch)):
             layout.prop(self, name)
         if self.whole:
             draw_chosen(layout, self, "tolerance")

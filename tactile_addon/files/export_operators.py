@@ -60,13 +60,13 @@ class TACTILE_OT_export_contacts(ObjectExport, bpy.types.Operator):
     filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
 
     def write(self, patch: Object) -> None:
-        contacts = contact_file.contacts_of(patch_record.reconstruction_of(patch))
         settings = bpy.context.scene.unit_settings
         named = core.UNIT_METERS.items() if settings.system != "NONE" else ()
         # An imported file brings numbers of this unit back as they are.
         unit = next(
             (name for name, meters in named if math.isclose(meters, settings.scale_length, rel_tol=1e-6)), ""
         )
+        contacts = contact_file.contacts_of(patch_record.reconstruction_of(patch))
         contact_file.write(self.filepath, contacts._replace(unit=unit))
 
 

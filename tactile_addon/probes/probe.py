@@ -245,8 +245,9 @@ def _found(probe: Object, name: str) -> float:
 def register() -> None:
     objects: Any = bpy.types.Object
     TactileProbe.__annotations__.update(number_fields.annotations(TactileProbe, _found))
-    degree = FitSettings.__annotations__["degree"].keywords
-    TactileProbe.__annotations__["degree_shown"] = number_fields.degree_field(degree, _found)
+    TactileProbe.__annotations__["degree_shown"] = number_fields.degree_field(
+        FitSettings.__annotations__["degree"].keywords, _found
+    )
     bpy.utils.register_class(TactileProbe)
     objects.tactile_probe = PointerProperty(type=TactileProbe, override=OVERRIDABLE)
     objects.tactile_colors = EnumProperty(
@@ -271,6 +272,5 @@ def register() -> None:
 
 def unregister() -> None:
     objects: Any = bpy.types.Object
-    del objects.tactile_contours
-    del objects.tactile_target, objects.tactile_colors, objects.tactile_probe
+    del objects.tactile_target, objects.tactile_contours, objects.tactile_colors, objects.tactile_probe
     bpy.utils.unregister_class(TactileProbe)

@@ -92,8 +92,7 @@ def stand_by(probe: Object, outdated: bool, complete: bool) -> None:
         return
     anchor.carry(probe, patch)
     patch_record.hold(patch)
-    record = record_of(patch)
-    if settings.message and record is not None and patch_record.VERDICT not in patch:
+    if settings.message and record_of(patch) is not None and patch_record.VERDICT not in patch:
         settings.message = ""  # There was no patch, and undo has brought it back.
     if outdated:
         patch_record.mark_outdated(

@@ -18,18 +18,17 @@ ZERO = 1e-6  # A number below this, in unit radius, counts as 0.
 
 def main_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     """(label, value) of what matters most, with lengths in a unit of units.py."""
-    mesh = rim = "…"
-    if "height_std_rim" in record:
-        rim = "± " + units.say(record["height_std_rim"], 1, unit)
+    rim = record.get("height_std_rim")
+    misfit = "…"
     if record["is_verified"]:
-        mesh = _said(record, "vertex_distance_mean", 1, unit) if record["vertices"] else "–"
+        misfit = _said(record, "vertex_distance_mean", 1, unit) if record["vertices"] else "–"
     return [
         ("Principal Curvatures", ""),
         ("κ1", _measured(record, "k1", -1, unit)),
         ("κ2", _measured(record, "k2", -1, unit)),
-        ("Height", "± " + units.say(record["height_std"], 1, unit)),
-        ("At the Rim", rim),
-        ("Misfit", mesh),
+        ("Height", f"± {units.say(record['height_std'], 1, unit)}"),
+        ("At the Rim", "…" if rim is None else f"± {units.say(rim, 1, unit)}"),
+        ("Misfit", misfit),
     ]
 
 

@@ -56,8 +56,7 @@ def expected_count(obj: Object, depsgraph: bpy.types.Depsgraph, extent: float, s
         return count
     # Long or narrow faces have their middles where others leave no room, as on a letter.
     middles = read_array(faces, "center", 3) @ linear.T
-    chosen = core.spaced(middles, spacing, np.random.default_rng(0))
-    return sum(index is not None for index in chosen)
+    return sum(index is not None for index in core.spaced(middles, spacing, np.random.default_rng(0)))
 
 
 class StabilityMap:

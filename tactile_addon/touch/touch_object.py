@@ -117,10 +117,17 @@ def _explored(
     **more: Any,
 ) -> core.Exploration:
     """What core.explore finds. Where long facets stand for a smooth bend, an error says so."""
-    more |= {"farthest": FARTHEST_SHARE * surface.size, "most_planes": MOST_PLANES}
     try:
         return core.explore(
-            surface, point, outward, planes, extent=extent or "auto", step=step or "auto", **more
+            surface,
+            point,
+            outward,
+            planes,
+            extent=extent or "auto",
+            step=step or "auto",
+            farthest=FARTHEST_SHARE * surface.size,
+            most_planes=MOST_PLANES,
+            **more,
         )
     except core.DegenerateCurvesError as error:
         facet = surface.facet(point)

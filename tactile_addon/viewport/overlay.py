@@ -54,9 +54,8 @@ def draw_key(seen: dict[str, Any]) -> None:
     if not is_over(context.region, *seen["mouse"]):
         return
     if seen["touched"] is not None:
-        count = len(seen["touched"].result.contours)
-        names = zip(range(1, count + 1), PLANE_COLORS, strict=False)
-        planes = [(f"Curve in Plane {number}", (*color, 1.0)) for number, color in names]
+        shown = PLANE_COLORS[: len(seen["touched"].result.contours)]
+        planes = [(f"Curve in Plane {number}", (*color, 1.0)) for number, color in enumerate(shown, 1)]
         _draw_box(context, "Preview", 0.0, [], [("Rim and Normal of the Patch", WHITE), *planes])
     elif seen["refusal"] is not None:
         _draw_words(context, textwrap.wrap(seen["refusal"], LETTERS), seen["mouse"])

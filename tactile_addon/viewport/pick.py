@@ -216,8 +216,7 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
                 touched = touch(obj, depsgraph, location, toward=eye, **touch_arguments(self))
                 self._seen["touched"] = touched
                 unit = units.unit_of(context.scene, touched.result.radius)
-                bends = curvatures(touched.report, unit)
-                words = short = f"{touched.report['source']}: principal curvatures {bends}"
+                words = short = f"{obj.name}: principal curvatures {curvatures(touched.report, unit)}"
         except ValueError as error:
             words = self._seen["refusal"] = sentence(error)
             short = "No touch is possible here"

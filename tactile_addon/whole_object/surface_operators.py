@@ -61,8 +61,8 @@ class TACTILE_OT_look_farthest(bpy.types.Operator):
 
 def _select_nearest(mesh: bpy.types.Mesh, place: Point) -> Any:
     """Selects the vertex nearest to a place, and nothing else, and returns it."""
-    points = read_array(mesh.vertices, "co", 3)
-    nearest = int(np.argmin(((points - np.array(place)) ** 2).sum(axis=1)))
+    offsets = read_array(mesh.vertices, "co", 3) - np.array(place)
+    nearest = int(np.argmin((offsets**2).sum(axis=1)))
     for parts in (mesh.vertices, mesh.edges, mesh.polygons):
         parts.foreach_set("select", np.zeros(len(parts), dtype=bool))
     mesh.vertices[nearest].select = True
@@ -85,11 +85,9 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        touches, hint = (
-            kept.touches_of(surface_of(context)),
-            "Only the last surface that was touched has its touches in memory",
-        )
-        return polls(cls, touches, hint) and is_in_object_mode(cls, context, "Surfaces are made")
+        hint = "Only the last surface that was touched has its touches in memory"
+        has_touches = polls(cls, kept.touches_of(surface_of(context)), hint)
+        return has_touches and is_in_object_mode(cls, context, "Surfaces are made")
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         if bpy.app.background:
@@ -130,8 +128,9 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
-        size = surface_of(context)[patch_record.ATLAS_RECORD]["size"]
-        draw_chosen(layout, self, "edge", fields=fields(size))
+        draw_chosen(
+            layout, self, "edge", fields=fields(surface_of(context)[patch_record.ATLAS_RECORD]["size"])
+        )
 
 
 CLASSES = (TACTILE_OT_look_farthest, TACTILE_OT_mesh_again)
