@@ -242,35 +242,38 @@ def _found(probe: Object, name: str) -> float:
     return 0.0 if record is None or name == "noise" else record.get(name, 0.0)
 
 
-def register() -> None:
-    objects: Any = bpy.types.Object
-    TactileProbe.__annotations__.update(number_fields.annotations(TactileProbe, _found))
-    TactileProbe.__annotations__["degree_shown"] = number_fields.degree_field(
-        FitSettings.__annotations__["degree"].keywords, _found
-    )
-    bpy.utils.register_class(TactileProbe)
-    objects.tactile_probe = PointerProperty(type=TactileProbe, override=OVERRIDABLE)
-    objects.tactile_colors = EnumProperty(
+# Properties of objects, by name.
+PROPERTIES = {
+    "tactile_probe": PointerProperty(type=TactileProbe, override=OVERRIDABLE),
+    "tactile_colors": EnumProperty(
         name="Colors",
         description="What the colors of the patch show",
         items=[item[:3] for item in patch_record.QUANTITIES],
         override=OVERRIDABLE,
         update=lambda obj, _: _show(obj),
-    )
-    objects.tactile_contours = BoolProperty(
+    ),
+    "tactile_contours": BoolProperty(
         name="Contours",
         description="Show the curves that the finger followed",
         get=lambda obj: (lines := patch_record.contours_of(obj)) is not None and not lines.hide_viewport,
         set=lambda obj, shown: _show_contours(obj, shown),
-    )
-    objects.tactile_target = StringProperty(  # A pointer would keep a deleted mesh.
+    ),
+    "tactile_target": StringProperty(  # A pointer would keep a deleted mesh.
         name="Target",
         description="Name of the mesh object to put the patch onto, or to compare it with",
         override=OVERRIDABLE,
+    ),
+}
+
+
+def register() -> None:
+    """Registers the settings of probes, which PROPERTIES need."""
+    TactileProbe.__annotations__.update(number_fields.annotations(TactileProbe, _found))
+    TactileProbe.__annotations__["degree_shown"] = number_fields.degree_field(
+        FitSettings.__annotations__["degree"].keywords, _found
     )
+    bpy.utils.register_class(TactileProbe)
 
 
 def unregister() -> None:
-    objects: Any = bpy.types.Object
-    del objects.tactile_target, objects.tactile_contours, objects.tactile_colors, objects.tactile_probe
     bpy.utils.unregister_class(TactileProbe)
