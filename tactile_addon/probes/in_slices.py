@@ -58,6 +58,13 @@ class InSlices(OperatorMixin):
             return report_error(self, error)
         return self._go_on(context)
 
+    def _confirm(self, context: bpy.types.Context, text: str) -> Outcome:
+        """Asks in a dialog, whose button has this text, before it begins."""
+        if bpy.app.background:
+            return self.execute(context)
+        self._in_window = True
+        return context.window_manager.invoke_props_dialog(self, confirm_text=text)
+
     def execute(self, context: bpy.types.Context) -> Outcome:
         try:
             self._begin(context)
@@ -146,14 +153,11 @@ class AllOver(InSlices):
     _about: Callable[[bpy.types.Context], str]
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
-        if bpy.app.background:
-            return self.execute(context)
-        self._in_window = True
         try:
             self.target = target_object(context, self.target).name
         except ValueError as error:
             return report_error(self, error)
-        return context.window_manager.invoke_props_dialog(self, confirm_text="Touch")
+        return self._confirm(context, "Touch")
 
     def _draw_target(self, context: bpy.types.Context) -> dict[str, str]:
         """Draws the mesh and what it will take; returns the properties of lengths, see number_fields."""

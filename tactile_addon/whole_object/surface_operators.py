@@ -90,10 +90,7 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
         return has_touches and is_in_object_mode(cls, context, "Surfaces are made")
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
-        if bpy.app.background:
-            return self.execute(context)
-        self._in_window = True
-        return context.window_manager.invoke_props_dialog(self, confirm_text="Mesh Again")
+        return self._confirm(context, "Mesh Again")
 
     def _begin(self, context: bpy.types.Context) -> None:
         obj = surface_of(context)
