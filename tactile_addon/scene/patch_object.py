@@ -105,10 +105,9 @@ def rewrite(patch: Object, touched: Touched) -> None:
     patch[RECORD] = touched.report | names
     patch.pop(RECONSTRUCTION, None)
     patch.pop(VERDICT, None)
-    if touched.report["is_verified"]:
-        patch[RECONSTRUCTION] = json.dumps(core.to_dict(touched.result), allow_nan=False)
     recolor(patch)
     if touched.report["is_verified"]:
+        patch[RECONSTRUCTION] = json.dumps(core.to_dict(touched.result), allow_nan=False)
         settle(patch)
 
 
