@@ -120,8 +120,8 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
         return self.invoke_popup(context)  # A file was dropped; without one, the file browser opens.
 
     def execute(self, context: bpy.types.Context) -> Outcome:
-        self._paths = [str(Path(self.directory) / each.name) for each in self.files if each.name]
-        self._paths = self._paths or [self.filepath]
+        named = [str(Path(self.directory) / each.name) for each in self.files if each.name]
+        self._paths = named or [self.filepath]
         try:
             scale = context.scene.unit_settings.scale_length
             self._contacts = measured.read(self._paths, self.unit, scale, self.whole)

@@ -39,9 +39,9 @@ class _ProbeOperator(OperatorMixin):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        found = probe.probe_of(context.view_layer.objects.active)
+        hint = "Select a probe, or pick a reference point first"
         return (
-            polls(cls, found, "Select a probe, or pick a reference point first")
+            polls(cls, probe.probe_of(context.view_layer.objects.active), hint)
             and is_in_object_mode(cls, context, "Probes are changed")
             and is_unlocked(cls, context)
         )

@@ -71,6 +71,7 @@ def label(power: int, unit: Unit) -> Callable[[float], str]:
 
 
 def _settings(record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """(label, value) of the settings that a record has."""
     names = ("method", "degree", "tolerance", "most", "spacing", "extent", "step", "noise", "seed")
     rows = [(WORDS.get(name, name), _setting(name, record[name])) for name in names if name in record]
     planes = [f"{azimuth:.0f}° leaning {tilt:.0f}°" for azimuth, tilt in record.get("planes", ())]
@@ -84,6 +85,7 @@ def _setting(name: str, value: Any) -> str:
 
 
 def _versions() -> list[tuple[str, str]]:
+    """(name, version) of the programs behind a page."""
     import scipy
 
     return [

@@ -143,7 +143,7 @@ def collection(scene: bpy.types.Scene) -> bpy.types.Collection:
 
 def _fill_patch(obj: Object, touched: Touched) -> None:
     """Fills the mesh with the patch in its Darboux frame; deviations are 0 until the patch is verified."""
-    result, frame, mesh = touched.result, touched.result.frame, obj.data
+    result, frame = touched.result, touched.result.frame
     points, triangles = result.mesh()
     d = result.geometry.derivatives(*points[:, :2].T)
     deviation = np.zeros(len(points))
@@ -159,7 +159,7 @@ def _fill_patch(obj: Object, touched: Touched) -> None:
         (PLACE, places),
         (COLOR, np.ones((len(points), 4))),
     ]
-    fill(mesh, points, triangles, attributes)
+    fill(obj.data, points, triangles, attributes)
 
 
 def _follow(obj: Object, touched: Touched) -> None:

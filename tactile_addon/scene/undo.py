@@ -55,8 +55,7 @@ def take_out(*_: Any) -> None:
     _links.clear()
     if not (_added or _replaced):
         return
-    added = [obj for obj in bpy.data.objects if obj.session_uid in _added]
-    for obj in added:
+    for obj in [obj for obj in bpy.data.objects if obj.session_uid in _added]:
         for child in obj.children:
             _links.append((_set_parent, child.session_uid, obj.session_uid))
             child.parent = None

@@ -70,6 +70,7 @@ def found_values(record: Mapping[str, Any] | None, scene: bpy.types.Scene) -> di
 
 
 def _said(record: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
+    """A value of the record, which is in length^power, in words."""
     return units.say(_value(record, key, power), power, unit)
 
 
@@ -80,11 +81,12 @@ def _shape_index(record: Mapping[str, Any]) -> str:
 
 
 def _measured(record: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
+    """A value of the record, which is in length^power, in words with its standard deviation."""
     return units.say(_value(record, key, power), power, unit, record[f"{key}_std"])
 
 
 def _value(record: Mapping[str, Any], key: str, power: int) -> float:
-    # In single precision a little is left of 0.
+    """A value of the record, which is in length^power; what single precision leaves of 0 is 0."""
     return record[key] if abs(record[key]) > ZERO * record["radius"] ** power else 0.0
 
 

@@ -31,7 +31,7 @@ class MeshSurface(PlacedMesh):
         try:
             evaluated, linear, origin = evaluated_object(obj, depsgraph)
             if not sound:
-                self._co = coordinates(obj.name, evaluated)
+                self._co = coordinates(evaluated)
             evaluated.ray_cast((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), distance=1e-30, depsgraph=depsgraph)
         except RuntimeError as error:
             raise disabled(obj) from error
@@ -47,7 +47,7 @@ class MeshSurface(PlacedMesh):
 
     @cached_property
     def _co(self) -> Array:
-        return coordinates(self._object.name, self._object)
+        return coordinates(self._object)
 
     def vertices_near(self, point: Point, radius: float, most: int | None = None) -> tuple[Array, Array]:
         """World coordinates and normals (any length) of vertices within `radius` of a world point.
