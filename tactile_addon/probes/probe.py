@@ -97,9 +97,8 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
     lost: StringProperty(description="Data of a target that was deleted", options={"HIDDEN"})
 
 
-_targets: set[int] | None = (
-    None  # The session_uids of the probes' targets, 0 for none; None if they are to be looked up.
-)
+# The session_uids of the probes' targets, 0 for none; None if they are to be looked up.
+_targets: set[int] | None = None
 
 
 def targets() -> set[int]:

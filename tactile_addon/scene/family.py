@@ -9,9 +9,8 @@ import bpy
 
 from ..touch.types import Object
 
-_remembered: dict[Object, list[Object]] | None = (
-    None  # Within `remembered`, the children by their parents; empty until it is needed.
-)
+# Within `remembered`, the children by their parents; empty until it is needed.
+_remembered: dict[Object, list[Object]] | None = None
 
 
 def all_objects() -> Iterable[Object]:

@@ -18,12 +18,10 @@ from ..touch.types import Object
 
 _is_late = False
 _added: set[int] = set()  # The session_uids of objects and collections that were added.
-_replaced: dict[
-    int, int
-] = {}  # The session_uids of meshes, by those of the copies that have taken their places.
-_links: list[
-    tuple[Any, ...]
-] = []  # Links that were taken out: a function that puts one back, and session_uids.
+# The session_uids of meshes, by those of the copies that have taken their places.
+_replaced: dict[int, int] = {}
+# Links that were taken out: a function that puts one back, and the session_uids of its arguments.
+_links: list[tuple[Any, ...]] = []
 
 
 @contextmanager

@@ -23,7 +23,7 @@ class MeshSurface(PlacedMesh):
     """The evaluated mesh of an object, which core.track touches through `ray_cast`.
 
     sound : whether all its vertices are known to be at finite places, which takes time to check
-    size : the longest edge of its bounding box, in the world
+    name : of the object; size : the longest edge of its bounding box, in the world
     """
 
     def __init__(self, obj: Object, depsgraph: bpy.types.Depsgraph, sound: bool = False) -> None:
@@ -43,7 +43,7 @@ class MeshSurface(PlacedMesh):
 
         super().__init__(linear, origin, cast)
         self._mesh, self._object, self._depsgraph = evaluated.data, evaluated, depsgraph
-        self.size = size_of(evaluated, linear)
+        self.name, self.size = obj.name, size_of(evaluated, linear)
 
     @cached_property
     def _co(self) -> Array:

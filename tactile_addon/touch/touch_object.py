@@ -78,7 +78,7 @@ def touch(
     clock = [perf_counter()]
     surface = MeshSurface(obj, depsgraph, sound)
     require_lengths(obj.name, surface.size, extent, step, noise)
-    point, surface_normal = nearest_point(obj.name, surface, location, extent or AWAY * surface.size)
+    point, surface_normal = nearest_point(surface, location, extent or AWAY * surface.size)
     require_fine(surface.spacing(point), step or extent / LEAST_STEPS or FINEST_STEP * surface.size)
     outward = unit_vector("outward", surface_normal if outward is None else outward)
     if toward is not None and np.dot(outward, toward) < 0.0:
@@ -200,7 +200,7 @@ def require_lengths(name: str, size: float, extent: float, step: float, noise: f
 
 
 def nearest_point(
-    name: str, surface: MeshSurface | DetachedMesh, location: Point, farthest: float
+    surface: MeshSurface | DetachedMesh, location: Point, farthest: float
 ) -> tuple[Triple, Triple]:
     """The point of a surface nearest to a location, and the normal there.
 
@@ -211,8 +211,8 @@ def nearest_point(
     point, normal, distance = surface.project(location)
     if distance > farthest:
         raise ValueError(
-            f'The location is {length(distance)} away from "{name}", farther than {length(farthest)}: '
-            "move it to the surface"
+            f'The location is {length(distance)} away from "{surface.name}", farther than '
+            f"{length(farthest)}: move it to the surface"
         )
     return point, normal
 

@@ -80,7 +80,7 @@ class ObjectTouches:
         self._start = None
         if location is not None:
             at = np.subtract(location, self.surface.origin)
-            self._start = nearest_point(obj.name, self.surface, at, AWAY * self.surface.size)
+            self._start = nearest_point(self.surface, at, AWAY * self.surface.size)
 
     def _require_lengths(self, noise: float, edge: float) -> None:
         """Raises ValueError, with a sentence, for lengths that are too large or too small for this object."""
