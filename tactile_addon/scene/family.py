@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The children of objects. Blender looks through all objects for those of one; this looks once for many."""
+"""All objects of the file, and the children of each.
+
+Blender looks through all objects for the children of one; this looks once for many.
+"""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
