@@ -215,10 +215,11 @@ class StabilityMap:
             known = values[values != NOTHING].tolist()
             if known:
                 report[f"{name}_median"] = median(known)
-        names = ("spacing", "extent", "step", "noise", "seed")
-        report |= {name: getattr(self, name) for name in names} | self.fit
-        angles = [(plane.azimuth, plane.tilt) for plane in self.planes]
-        return report | {"planes": np.degrees(angles).tolist()}
+        return report | {
+            **{name: getattr(self, name) for name in ("spacing", "extent", "step", "noise", "seed")},
+            **self.fit,
+            "planes": np.degrees([(plane.azimuth, plane.tilt) for plane in self.planes]).tolist(),
+        }
 
 
 def _reason_of(stops: Iterable[str]) -> int:
