@@ -43,7 +43,7 @@ MENUS = (
     *export_operators.MENUS,
     *report_operator.MENUS,
 )
-PROPERTIES = color_range.PROPERTIES | map_object.PROPERTIES  # Of objects, by name.
+PROPERTIES = probe.PROPERTIES | color_range.PROPERTIES | map_object.PROPERTIES  # Of objects, by name.
 _commands: list[Any] = []
 _drawings: list[Any] = []
 HERE = str(Path(__file__).resolve().parent)  # It holds presets/.

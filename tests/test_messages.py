@@ -18,6 +18,7 @@ ROWS = [
 ]
 ROWS = [row.strip("| ") for row in ROWS if row.strip("| ") not in ("message", "status")]
 ERRORS = {"ValueError", "DegenerateCurvesError", "EngineError", "HopelessError", "NotStartedError"}
+REPORTS = {"report", "report_done", "mark_outdated"}  # Calls whose second argument is a message.
 
 
 def text_of(node):
@@ -33,9 +34,7 @@ def sentences(node):
     """The nodes that are messages: of errors, of reports, of a status, of a probe."""
     if isinstance(node, ast.Call):
         name = getattr(node.func, "id", None) or getattr(node.func, "attr", None)
-        return (
-            node.args[:1] if name in ERRORS else node.args[1:2] if name in ("report", "mark_outdated") else []
-        )
+        return node.args[:1] if name in ERRORS else node.args[1:2] if name in REPORTS else []
     if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple):
         return node.value.elts[1:] if isinstance(node.value.elts[0], ast.Constant) else []
     if isinstance(node, ast.Yield):

@@ -92,6 +92,7 @@ def test_core_knows_no_blender_and_the_add_on_none_of_its_rooms():
             "core.contact_data",
             "core.contact_data.rows",
             "core.steps",
+            "core.triangles",
         }, name
 
 

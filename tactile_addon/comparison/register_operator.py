@@ -8,7 +8,6 @@ from time import perf_counter
 from typing import Any
 
 import bpy
-import numpy as np
 from bpy.props import IntProperty, StringProperty
 from mathutils import Matrix
 
@@ -16,7 +15,7 @@ from ... import core
 from ...core.arguments import many
 from ..probes import probe
 from ..probes.in_slices import InSlices, Progress
-from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, target_object
+from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, report_done, target_object
 from ..scene import patch_record
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.touch_report import Registration
@@ -83,12 +82,11 @@ class Search:
         if pose > len(self.poses):
             poses = many(len(self.poses), "pose", "poses")
             raise ValueError(f'The search has found {poses} on "{self.target}": choose a lower number')
-        chosen, matrix = self.poses[pose - 1], np.eye(4)
         patch: Object = bpy.data.objects.get(self.patch)
         if patch is None:
             raise ValueError(f'"{self.patch}" was deleted while its place was searched for')
-        matrix[:3, :3], matrix[:3, 3] = chosen.rotation, chosen.translation
-        patch.matrix_world = Matrix(matrix.tolist()) @ self._matrix
+        motion = patch_record.matrix_of(self.poses[pose - 1].rotation, self.poses[pose - 1].translation)
+        patch.matrix_world = Matrix(motion.tolist()) @ self._matrix
         patch[patch_record.RECORD]["registration"] = {
             "target": self.target,
             "pose": pose,
@@ -152,8 +150,7 @@ class TACTILE_OT_register(InSlices, bpy.types.Operator):
 
     def _finish(self, context: bpy.types.Context) -> Outcome:
         found = self._search.put(self.pose)
-        self.report({"WARNING"} if found["is_ambiguous"] else {"INFO"}, registration_summary(found))
-        return {"FINISHED"}
+        return report_done(self, registration_summary(found), not found["is_ambiguous"])
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

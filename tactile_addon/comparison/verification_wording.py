@@ -80,4 +80,5 @@ def verification_rows(found: Mapping[str, Any], unit: Unit) -> list[tuple[str, s
 
 
 def _length(found: Mapping[str, Any], key: str, unit: Unit) -> str:
+    """A length in words, or a dash if a verification has not found it."""
     return units.say(found[key], 1, unit) if key in found else "–"

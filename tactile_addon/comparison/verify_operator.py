@@ -15,11 +15,11 @@ from ...core.steps import result_of
 from ..probes import probe, touch_again
 from ..probes.change_handlers import is_pending
 from ..probes.in_slices import InSlices, Progress
-from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, target_object
+from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, report_done, target_object
 from ..scene import attributes, mesh_data, patch_record, shown
 from ..touch.surface import MeshSurface
 from ..touch.touch_report import TouchReport, judgment
-from ..touch.types import Array, Object, Outcome
+from ..touch.types import Object, Outcome
 from .verification_wording import verification_summary
 
 VERTICES_AT_ONCE = 2000  # A step looks at this many vertices.
@@ -79,8 +79,10 @@ class Verification:
         """Writes what was found to the patch: its deviations, and `verification` in its record."""
         (patch, _), r, surface = self._objects(), self._r, self._surface
         record = patch[patch_record.RECORD]
-        points, normals = _vertices(patch.data, r, r.radius / record["radius"])
-        deviations = surface.deviations(r.frame.to_world(points), normals @ r.frame.axes.T, r.radius)
+        # The object's mesh may have another scale than the patch.
+        points = r.radius / record["radius"] * mesh_data.values(patch.data, attributes.POSITION)
+        normals = r.geometry.normal(points[:, 0], points[:, 1]) @ r.frame.axes.T
+        deviations = surface.deviations(r.frame.to_world(points), normals, r.radius)
         mesh_data.own_mesh(patch)
         mesh_data.write(patch.data, attributes.DEVIATION, deviations)
         shown.recolor(patch)
@@ -117,12 +119,6 @@ def _inputs(patch: Object, target: Object) -> tuple[Any, ...]:
     return patch[patch_record.RECONSTRUCTION], *(
         tuple(map(tuple, obj.matrix_world)) for obj in (patch, target)
     )
-
-
-def _vertices(mesh: bpy.types.Mesh, r: core.Reconstruction, scale: float) -> tuple[Array, Array]:
-    """Points and unit normals of the patch's vertices, in its frame and scaled by `scale`."""
-    points = scale * mesh_data.values(mesh, attributes.POSITION)
-    return points, r.geometry.normal(points[:, 0], points[:, 1])
 
 
 class TACTILE_OT_verify(InSlices, bpy.types.Operator):
@@ -167,8 +163,7 @@ class TACTILE_OT_verify(InSlices, bpy.types.Operator):
         record = self._verification.write()
         probe.patch_near(context.view_layer.objects.active).tactile_colors = "deviation"
         doubt, summary = verification_summary(record)
-        self.report({"WARNING"} if doubt else {"INFO"}, summary)
-        return {"FINISHED"}
+        return report_done(self, summary, not doubt)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
@@ -181,8 +176,11 @@ def chosen_mesh(context: bpy.types.Context, patch: Object) -> str:
 
     Raises ValueError if there is none, or if several meshes are selected.
     """
-    selected = context.view_layer.objects.selected
-    names = [obj.name for obj in selected if obj.type == "MESH" and not probe.is_result(obj)]
+    names = [
+        obj.name
+        for obj in context.view_layer.objects.selected
+        if obj.type == "MESH" and not probe.is_result(obj)
+    ]
     if len(names) > 1:
         raise ValueError(
             f"{len(names)} meshes are selected: select one besides the patch, or none to compare "

@@ -20,9 +20,9 @@ from bpy_extras.io_utils import ImportHelper
 from ... import core
 from ...core.arguments import many
 from ..probes.in_slices import InSlices, Progress
-from ..probes.operators import is_in_object_mode, make_active, report_error
+from ..probes.operators import is_in_object_mode, make_active, report_done, report_error
 from ..scene import patch_object
-from ..touch.settings import FitSettings, draw_chosen, draw_solver, length_property
+from ..touch.settings import FitSettings, draw_chosen, draw_solver, given, length_property
 from ..touch.types import Outcome
 from ..touch.units import length
 from ..touch.wording import fit_summary
@@ -120,8 +120,8 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
         return self.invoke_popup(context)  # A file was dropped; without one, the file browser opens.
 
     def execute(self, context: bpy.types.Context) -> Outcome:
-        self._paths = [str(Path(self.directory) / each.name) for each in self.files if each.name]
-        self._paths = self._paths or [self.filepath]
+        named = [str(Path(self.directory) / each.name) for each in self.files if each.name]
+        self._paths = named or [self.filepath]
         try:
             scale = context.scene.unit_settings.scale_length
             self._contacts = measured.read(self._paths, self.unit, scale, self.whole)
@@ -134,8 +134,8 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
         touched = measured.fit(
             Path(self._paths[0]).name,
             self._contacts,
-            point=json.loads(self.exact_point) if self.exact_point else self._given("point"),
-            outward=self._given("outward"),
+            point=json.loads(self.exact_point) if self.exact_point else given(self, "point"),
+            outward=given(self, "outward"),
             flip=self.flip,
             all_strokes=self.strokes,
             radius=self.radius,
@@ -147,17 +147,15 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
             solver=self.solver,
         )
         make_active(context, patch_object.insert(context.scene, touched))
-        report = touched.report
-        summary = fit_summary(report)
+        report, summary = touched.report, fit_summary(touched.report)
         if "misses" in report:
             summary += f"; curves miss their common point by {length(max(report['misses']))} at most"
-        self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, summary)
-        return {"FINISHED"}
+        return report_done(self, summary, report["status"] == "ok")
 
     def _begin(self, context: bpy.types.Context) -> None:
         self._object = measured.MeasuredObject(
             self._contacts,
-            outward=self._given("outward"),
+            outward=given(self, "outward"),
             flip=self.flip,
             tolerance=self.tolerance,
             noise=self.noise,
@@ -172,18 +170,13 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
         report = self._object.report()
         made = whole_mesh.insert(context.scene, Path(self._paths[0]).name + more, self._object.whole, report)
         make_active(context, made)
-        self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, object_summary(report))
-        return {"FINISHED"}
-
-    def _given(self, name: str) -> list[float] | None:
-        return list(getattr(self, name)) if self.properties.is_property_set(name) else None
+        return report_done(self, object_summary(report), report["status"] == "ok")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
         of_patch = "point", "strokes", "radius", "flip", "noise", "normal_std"
-        of_object = "outward", "flip", "noise"
-        for name in ("unit", "whole", *(of_object if self.whole else of_patch)):
+        for name in ("unit", "whole", *(("outward", "flip", "noise") if self.whole else of_patch)):
             layout.prop(self, name)
         if self.whole:
             draw_chosen(layout, self, "tolerance")

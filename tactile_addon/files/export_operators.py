@@ -14,7 +14,7 @@ from bpy_extras.io_utils import ExportHelper
 from ... import core
 from ...core.arguments import many
 from ..probes import probe
-from ..probes.operators import polls, report_error
+from ..probes.operators import polls, report_done, report_error
 from ..scene import patch_record
 from ..touch.types import Object, OperatorMixin, Outcome
 from . import contact_file, patch_table
@@ -48,8 +48,7 @@ class ObjectExport(ExportHelper, OperatorMixin):  # type: ignore[misc]  # of `in
             self.write(self.written(context))
         except (OSError, ValueError) as error:
             return report_error(self, error)
-        self.report({"INFO"}, f'Wrote "{Path(self.filepath).name}"')
-        return {"FINISHED"}
+        return report_done(self, f'Wrote "{Path(self.filepath).name}"')
 
 
 class TACTILE_OT_export_contacts(ObjectExport, bpy.types.Operator):
@@ -61,13 +60,13 @@ class TACTILE_OT_export_contacts(ObjectExport, bpy.types.Operator):
     filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
 
     def write(self, patch: Object) -> None:
-        contacts = contact_file.contacts_of(patch_record.reconstruction_of(patch))
         settings = bpy.context.scene.unit_settings
         named = core.UNIT_METERS.items() if settings.system != "NONE" else ()
         # An imported file brings numbers of this unit back as they are.
         unit = next(
             (name for name, meters in named if math.isclose(meters, settings.scale_length, rel_tol=1e-6)), ""
         )
+        contacts = contact_file.contacts_of(patch_record.reconstruction_of(patch))
         contact_file.write(self.filepath, contacts._replace(unit=unit))
 
 
@@ -109,8 +108,7 @@ class TACTILE_OT_export_table(bpy.types.Operator, ExportHelper):  # type: ignore
         except (OSError, ValueError) as error:
             return report_error(self, error)
         count, name = many(len(patches), "patch", "patches"), Path(self.filepath).name
-        self.report({"INFO"}, f'Wrote a table of {count}: "{name}"')
-        return {"FINISHED"}
+        return report_done(self, f'Wrote a table of {count}: "{name}"')
 
 
 def draw_export(self: bpy.types.Menu, context: bpy.types.Context) -> None:

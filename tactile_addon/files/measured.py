@@ -107,8 +107,12 @@ class MeasuredObject:
 
     def report(self) -> dict[str, Any]:
         """What was found, as a dict of plain values."""
-        found = {"contacts": sum(len(contour.points) for contour in self._felt), **self.whole.report()}
-        return found | {"tolerance": self._tolerance, "noise": self._noise}
+        return {
+            "contacts": sum(len(contour.points) for contour in self._felt),
+            **self.whole.report(),
+            "tolerance": self._tolerance,
+            "noise": self._noise,
+        }
 
 
 def _scaled(curve: core.Contour, factor: float) -> core.Contour:

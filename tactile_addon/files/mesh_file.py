@@ -80,8 +80,7 @@ def write(path: Path, obj: Object) -> None:
     Raises OSError with a sentence, as save_scene does; the old file is then as it was.
     """
     with whole_file.replacing(path) as temporary:
-        window = bpy.context.window_manager.windows[0]
-        with bpy.context.temp_override(selected_objects=[obj], window=window):
+        with bpy.context.temp_override(selected_objects=[obj], window=bpy.context.window_manager.windows[0]):
             bpy.ops.wm.ply_export(
                 filepath=str(temporary),
                 export_selected_objects=True,

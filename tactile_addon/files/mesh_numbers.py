@@ -47,8 +47,7 @@ def _of_ply(data: bytes) -> int:
 def _of_stl(data: bytes) -> int:
     triangles = int.from_bytes(data[STL_HEAD - 4 : STL_HEAD], "little")
     if len(data) == STL_HEAD + triangles * STL_TRIANGLE.itemsize:
-        corners = np.frombuffer(data, STL_TRIANGLE, triangles, STL_HEAD)["corners"]
-        return _of_numbers(corners.reshape(-1, 3))
+        return _of_numbers(np.frombuffer(data, STL_TRIANGLE, triangles, STL_HEAD)["corners"].reshape(-1, 3))
     return _of_lines([line for line in data.splitlines() if line.lstrip().startswith(b"vertex")], AFTER_WORD)
 
 

@@ -118,9 +118,8 @@ def _seat(*matrices: float) -> Array:
 
 def keep(probe: Object, patch: Object) -> None:
     """Keeps where the probe's target is in a patch that was touched just now."""
-    target = probe.tactile_probe.target
-    axes, origin = patch_record.touched_frame(patch)
-    patch[BASE] = [*_numbers(target.matrix_world), *_numbers(patch_record.matrix_of(axes, origin))]
+    frame = patch_record.matrix_of(*patch_record.touched_frame(patch))
+    patch[BASE] = [*_numbers(probe.tactile_probe.target.matrix_world), *_numbers(frame)]
 
 
 @np.errstate(all="ignore")  # Objects may be beyond all numbers.

@@ -181,16 +181,14 @@ def _settle() -> float | None:
             if _unsure:
                 on_depsgraph_update(window.scene, depsgraph)
             objects: list[Object] = list(window.view_layer.objects)
-            for probe in filter(is_probe, objects):
-                late = probe.tactile_probe.live and is_outdated(probe, depsgraph)
-                if lock_of(probe) is not None:
-                    continue
-                if late or is_pending(probe):
+            for probe in (obj for obj in objects if is_probe(obj) and lock_of(obj) is None):
+                outdated = is_outdated(probe, depsgraph)
+                if (outdated and probe.tactile_probe.live) or is_pending(probe):
                     update(probe, depsgraph, complete=True)
                     if perf_counter() > end:
                         return 0.01
                 else:
-                    stand_by(probe, is_outdated(probe, depsgraph), complete=True)
+                    stand_by(probe, outdated, complete=True)
     return None
 
 

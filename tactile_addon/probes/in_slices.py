@@ -5,14 +5,15 @@
 import sys
 from collections.abc import Callable, Iterator
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import bpy
 from bpy.props import BoolProperty
 
-from ..touch.settings import UNSAVED
+from ..touch.settings import TARGET, UNSAVED
 from ..touch.types import OperatorMixin, Outcome
-from .operators import report_error, target_object
+from ..touch.wording import sentence
+from .operators import fields_of, report_error, target_object
 
 # These are seconds.
 FIRST_SLICE = 0.2  # Work that takes no longer is done without slices.
@@ -36,8 +37,6 @@ class InSlices(OperatorMixin):
         options={"HIDDEN", *UNSAVED},
     )
 
-    if TYPE_CHECKING:  # At run time it is the property of operators that have one.
-        target: str
     _steps: Iterator[Any]
     _share: Any = 0.0  # What the steps yielded last: the share that is done, if they yield that.
     _begin: Callable[[bpy.types.Context], None]
@@ -59,16 +58,12 @@ class InSlices(OperatorMixin):
             return report_error(self, error)
         return self._go_on(context)
 
-    def _ask(self, context: bpy.types.Context) -> Outcome:
-        """Asks in a dialog that names the mesh to touch before it begins."""
+    def _confirm(self, context: bpy.types.Context, text: str) -> Outcome:
+        """Asks in a dialog, whose button has this text, before it begins."""
         if bpy.app.background:
             return self.execute(context)
         self._in_window = True
-        try:
-            self.target = target_object(context, self.target).name
-        except ValueError as error:
-            return report_error(self, error)
-        return context.window_manager.invoke_props_dialog(self, confirm_text="Touch")
+        return context.window_manager.invoke_props_dialog(self, confirm_text=text)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         try:
@@ -146,7 +141,38 @@ class InSlices(OperatorMixin):
             print(f"{self.bl_label}: stopped because the file or the window was closed", file=sys.stderr)
 
 
-def _status(stop: str, words: str, share: float | None = None) -> Callable[[Any, bpy.types.Context], None]:
+class AllOver(InSlices):
+    """For operators that touch a mesh all over to inherit; a dialog names the mesh before they begin.
+
+    Each has `_about(context)`, a sentence on what it will take, which may raise ValueError, with a sentence.
+    """
+
+    target: TARGET
+
+    meanwhile = {"PASS_THROUGH"}  # The scene may change, because a detached mesh is touched.
+    _about: Callable[[bpy.types.Context], str]
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
+        try:
+            self.target = target_object(context, self.target).name
+        except ValueError as error:
+            return report_error(self, error)
+        return self._confirm(context, "Touch")
+
+    def _draw_target(self, context: bpy.types.Context) -> dict[str, str]:
+        """Draws the mesh and what it will take; returns the properties of lengths, see number_fields."""
+        layout = self.layout
+        layout.use_property_split, layout.use_property_decorate = True, False
+        layout.prop_search(self, "target", context.scene, "objects")
+        try:
+            words = self._about(context)
+        except ValueError as error:
+            words = sentence(error)
+        layout.label(text=words, translate=False)
+        return fields_of(context, self.target)
+
+
+def _status(stop: str, words: str, share: float | None) -> Callable[[Any, bpy.types.Context], None]:
     """The function that draws the status bar meanwhile; it may outlive the operator by a redraw."""
 
     def draw(header: Any, context: bpy.types.Context) -> None:

@@ -76,6 +76,7 @@ def pace_of(decade: int) -> float:
 
 
 def _unit_of(system: str, meters: float) -> float:
+    """The length in meters of the unit in which Blender shows a length in meters."""
     found = (unit for unit, least in LENGTH_UNITS[system] if meters >= least * (1.0 - 1e-4))
     return next(found, WHOLE[system])
 
@@ -95,9 +96,8 @@ def degree_field(given: Mapping[str, Any], found: Callable[[Object, str], float]
 
 
 def _field(name: str, given: Mapping[str, Any], decade: int, found: Callable[[Object, str], float]) -> Any:
-    shown = {key: given[key] for key in ("name", "description", "subtype", "soft_min")}
     return FloatProperty(
-        **shown,
+        **{key: given[key] for key in ("name", "description", "subtype", "soft_min")},
         precision=given.get("precision", 2),
         step=10.0**decade,
         options=HIDDEN_UNSAVED,

@@ -9,16 +9,7 @@ from typing import Any
 import bpy
 
 from ..scene import patch_object, patch_record
-from ..touch.settings import (
-    LOCATION,
-    OUTWARD,
-    TARGET,
-    UNSAVED,
-    TouchSettings,
-    draw_all,
-    length_property,
-    touch_arguments,
-)
+from ..touch.settings import UNSAVED, PlacedTouch, draw_all, given, length_property, touch_arguments
 from ..touch.touch_object import completed, touch
 from ..touch.types import Object, Outcome
 from ..touch.wording import fit_summary, sentence
@@ -28,16 +19,13 @@ from .probe import is_result, lock_of, patch_near, probe_of, record_of
 NO_MESH = "There is no mesh to touch: add one (Shift A), or import a scan (File > Import)"
 
 
-class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
+class TACTILE_OT_reconstruct(PlacedTouch, bpy.types.Operator):
     """Feel the surface along curves through a point and rebuild the patch around it"""
 
     bl_idname = "tactile.reconstruct"
     bl_label = "Fit Tactile Patch"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
-    target: TARGET
-    location: LOCATION
-    outward: OUTWARD
     tolerance: length_property(
         "Tolerance",
         "Add planes until the height is accurate to this or no plane would help; if not set, add none",
@@ -51,26 +39,21 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         return has_target(cls, context)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
-        given = self.properties.is_property_set
-        depsgraph = context.evaluated_depsgraph_get()
         try:
             with waiting(context):
                 touched = touch(
                     target_object(context, self.target),
-                    depsgraph,
-                    list(self.location) if given("location") else context.scene.cursor.location.to_tuple(),
-                    outward=list(self.outward) if given("outward") else None,
-                    tolerance=self.tolerance if given("tolerance") else None,
+                    context.evaluated_depsgraph_get(),
+                    given(self, "location") or context.scene.cursor.location.to_tuple(),
+                    outward=given(self, "outward"),
+                    tolerance=self.tolerance if self.properties.is_property_set("tolerance") else None,
                     **touch_arguments(self),
                 )
         except ValueError as error:
             return report_error(self, error)
         touched = completed(touched)
-        patch = patch_object.insert(context.scene, touched)
-        make_active(context, patch)
-        report = touched.report
-        self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, fit_summary(report))
-        return {"FINISHED"}
+        make_active(context, patch_object.insert(context.scene, touched))
+        return report_done(self, fit_summary(touched.report), touched.report["status"] == "ok")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
@@ -80,14 +63,20 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         for name in filter(self.properties.is_property_set, ("location", "outward")):
             layout.prop(self, name)
         draw_all(layout, self)
-        given = self.properties.is_property_set("tolerance")
-        layout.prop(self, "tolerance", text="Tolerance" if given else "Tolerance (Off)")
+        is_set = self.properties.is_property_set("tolerance")
+        layout.prop(self, "tolerance", text="Tolerance" if is_set else "Tolerance (Off)")
 
 
 def report_error(operator: bpy.types.Operator, error: Exception) -> Outcome:
     """Lets an operator report what is wrong, and returns what ends it."""
     operator.report({"ERROR"}, sentence(error))
     return {"CANCELLED"}
+
+
+def report_done(operator: bpy.types.Operator, words: str, is_good: bool = True) -> Outcome:
+    """Lets an operator report what it has done, as a warning unless that is good; returns what ends it."""
+    operator.report({"INFO"} if is_good else {"WARNING"}, words)
+    return {"FINISHED"}
 
 
 def target_object(context: bpy.types.Context, name: str) -> Object:
@@ -107,6 +96,12 @@ def target_object(context: bpy.types.Context, name: str) -> Object:
             else "No object is active: select the mesh object to touch"
         )
     return obj
+
+
+def surface_of(context: bpy.types.Context) -> Object | None:
+    """The active object if it is a whole object, or None."""
+    obj: Object = context.view_layer.objects.active
+    return obj if obj is not None and patch_record.ATLAS_RECORD in obj else None
 
 
 def fields_of(context: bpy.types.Context, name: str) -> dict[str, str]:

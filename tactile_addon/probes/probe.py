@@ -27,7 +27,7 @@ may differ afterward.
                      and touches then if there was no time before
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import bpy
@@ -42,7 +42,7 @@ from bpy.props import (
 
 from ... import core
 from ..scene import patch_object, patch_record, shown
-from ..scene.family import children_of
+from ..scene.family import all_objects, children_of
 from ..touch.settings import OVERRIDABLE, FitSettings, TouchSettings, changed, is_silent
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object
@@ -97,17 +97,15 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
     lost: StringProperty(description="Data of a target that was deleted", options={"HIDDEN"})
 
 
-_targets: set[int] | None = (
-    None  # The session_uids of the probes' targets, 0 for none; None if they are to be looked up.
-)
+# The session_uids of the probes' targets, 0 for none; None if they are to be looked up.
+_targets: set[int] | None = None
 
 
 def targets() -> set[int]:
     """The session_uids of the targets of all probes in this file; 0 for a probe without target."""
     global _targets
     if _targets is None:
-        objects: Iterable[Object] = bpy.data.objects
-        of = (obj.tactile_probe.target for obj in objects if is_probe(obj))
+        of = (obj.tactile_probe.target for obj in all_objects() if is_probe(obj))
         _targets = {0 if target is None else target.session_uid for target in of}
     return _targets
 
@@ -193,14 +191,12 @@ def record_of(obj: Object) -> TouchReport | None:
 
 def require_unlocked(obj: Object) -> None:
     """Raises ValueError if anything of the probe or patch near `obj` cannot be changed."""
-    patch = patch_near(obj)
-    lines = None if patch is None else patch_record.contours_of(patch)
-    for each in (probe_of(obj), patch, lines):
-        if each is not None and not each.is_editable:
+    for each in filter(None, (probe_of(obj), *patch_record.parts_of(patch_near(obj)))):
+        if not each.is_editable:
             raise ValueError(
                 f'"{each.name}" comes from a library: make it local, or override it, to change it'
             )
-        if each is not None and each.type == "MESH" and each.data.is_editmode:
+        if each.type == "MESH" and each.data.is_editmode:
             raise ValueError(f'"{each.name}" is being edited: leave its Edit Mode first')
 
 
@@ -245,35 +241,38 @@ def _found(probe: Object, name: str) -> float:
     return 0.0 if record is None or name == "noise" else record.get(name, 0.0)
 
 
-def register() -> None:
-    objects: Any = bpy.types.Object
-    TactileProbe.__annotations__.update(number_fields.annotations(TactileProbe, _found))
-    degree = FitSettings.__annotations__["degree"].keywords
-    TactileProbe.__annotations__["degree_shown"] = number_fields.degree_field(degree, _found)
-    bpy.utils.register_class(TactileProbe)
-    objects.tactile_probe = PointerProperty(type=TactileProbe, override=OVERRIDABLE)
-    objects.tactile_colors = EnumProperty(
+# Properties of objects, by name.
+PROPERTIES = {
+    "tactile_probe": PointerProperty(type=TactileProbe, override=OVERRIDABLE),
+    "tactile_colors": EnumProperty(
         name="Colors",
         description="What the colors of the patch show",
         items=[item[:3] for item in patch_record.QUANTITIES],
         override=OVERRIDABLE,
         update=lambda obj, _: _show(obj),
-    )
-    objects.tactile_contours = BoolProperty(
+    ),
+    "tactile_contours": BoolProperty(
         name="Contours",
         description="Show the curves that the finger followed",
         get=lambda obj: (lines := patch_record.contours_of(obj)) is not None and not lines.hide_viewport,
         set=lambda obj, shown: _show_contours(obj, shown),
-    )
-    objects.tactile_target = StringProperty(  # A pointer would keep a deleted mesh.
+    ),
+    "tactile_target": StringProperty(  # A pointer would keep a deleted mesh.
         name="Target",
         description="Name of the mesh object to put the patch onto, or to compare it with",
         override=OVERRIDABLE,
+    ),
+}
+
+
+def register() -> None:
+    """Registers the settings of probes, which PROPERTIES need."""
+    TactileProbe.__annotations__.update(number_fields.annotations(TactileProbe, _found))
+    TactileProbe.__annotations__["degree_shown"] = number_fields.degree_field(
+        FitSettings.__annotations__["degree"].keywords, _found
     )
+    bpy.utils.register_class(TactileProbe)
 
 
 def unregister() -> None:
-    objects: Any = bpy.types.Object
-    del objects.tactile_contours
-    del objects.tactile_target, objects.tactile_colors, objects.tactile_probe
     bpy.utils.unregister_class(TactileProbe)

@@ -17,7 +17,16 @@ from ..touch.settings import MOST_PLANES, length_property
 from ..touch.types import Object, OperatorMixin, Outcome
 from ..touch.wording import added_planes, verdict
 from . import probe, touch_again
-from .operators import has_patch, is_in_object_mode, is_unlocked, polls, report_error, waiting
+from .operators import (
+    has_patch,
+    is_in_object_mode,
+    is_unlocked,
+    polls,
+    report_done,
+    report_error,
+    surface_of,
+    waiting,
+)
 
 SUBDIVISIONS = 3  # A target gets this many levels at once,
 MOST_FACES = 500_000  # as long as it has no more faces then.
@@ -30,9 +39,9 @@ class _ProbeOperator(OperatorMixin):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        active = probe.probe_of(context.view_layer.objects.active)
+        hint = "Select a probe, or pick a reference point first"
         return (
-            polls(cls, active, "Select a probe, or pick a reference point first")
+            polls(cls, probe.probe_of(context.view_layer.objects.active), hint)
             and is_in_object_mode(cls, context, "Probes are changed")
             and is_unlocked(cls, context)
         )
@@ -89,8 +98,7 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
         touch_again.adopt(found, touched, depsgraph, complete=True)
         settings.is_probe = True
         unit = units.unit_of(context.scene, touched.result.radius)
-        self.report({"INFO"}, added_planes(touched.report, unit))
-        return {"FINISHED"}
+        return report_done(self, added_planes(touched.report, unit))
 
     def draw(self, context: bpy.types.Context) -> None:
         self.layout.use_property_split = True
@@ -156,32 +164,27 @@ class TACTILE_OT_add_subdivision(_ProbeOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if _whole_object(context) is None:
+        if surface_of(context) is None:
             return super().poll(context)
         return is_in_object_mode(cls, context, "Modifiers are added")
 
     def execute(self, context: bpy.types.Context) -> Outcome:
-        found, whole = probe.probe_of(context.view_layer.objects.active), _whole_object(context)
-        target = found.tactile_probe.target if whole is None else bpy.data.objects.get(whole["source"])
+        found, surface = probe.probe_of(context.view_layer.objects.active), surface_of(context)
+        if surface is None:
+            target = found.tactile_probe.target
+        else:
+            target = bpy.data.objects.get(surface[patch_record.ATLAS_RECORD]["source"])
         if target is None or not target.is_editable:
             return report_error(self, ValueError("The target cannot be changed: make it local first"))
         _subdivide(target)
         context.view_layer.update()
-        if whole is not None:
-            self.report({"INFO"}, f'"{target.name}" is subdivided: touch it all over again')
-            return {"FINISHED"}
+        if surface is not None:
+            return report_done(self, f'"{target.name}" is subdivided: touch it all over again')
         touch_again.refresh(found, context)
         if found.tactile_probe.message:
             return report_error(self, ValueError(found.tactile_probe.message))
         record = probe.record_of(found)
-        self.report({"INFO"}, verdict(record, units.unit_of(context.scene, record["radius"])))
-        return {"FINISHED"}
-
-
-def _whole_object(context: bpy.types.Context) -> Any:
-    """The report of the active object if it is a whole object, or None."""
-    active = context.view_layer.objects.active
-    return None if active is None else active.get(patch_record.ATLAS_RECORD)
+        return report_done(self, verdict(record, units.unit_of(context.scene, record["radius"])))
 
 
 def _subdivide(target: Object) -> None:
@@ -205,9 +208,7 @@ class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
-        patch = probe.patch_of(found)
-        lines = None if patch is None else patch_record.contours_of(patch)
-        patch_object.remove_objects(list(filter(None, (lines, patch, found))))
+        patch_object.remove_objects([*patch_record.parts_of(probe.patch_of(found)), found])
         return {"FINISHED"}
 
 
@@ -245,8 +246,7 @@ class TACTILE_OT_share_range(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> Outcome:
         patch = probe.patch_near(context.view_layer.objects.active)
         count = color_range.share(patch, context.view_layer.objects)
-        self.report({"INFO"}, f"One range of colors for {many(count, 'patch', 'patches')}")
-        return {"FINISHED"}
+        return report_done(self, f"One range of colors for {many(count, 'patch', 'patches')}")
 
 
 OPERATORS = (

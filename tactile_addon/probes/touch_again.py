@@ -3,7 +3,7 @@
 """How a probe touches again: the inputs of its patch, whether these have changed, and the new patch."""
 
 import hashlib
-from collections.abc import Container, Iterable
+from collections.abc import Container
 from typing import Any
 
 import bpy
@@ -11,6 +11,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..scene import patch_object, patch_record
+from ..scene.family import all_objects
 from ..touch.evaluated_mesh import checksum_of, is_disabled, require_invertible
 from ..touch.settings import touch_arguments
 from ..touch.touch_object import Touched, completed, touch
@@ -84,15 +85,14 @@ def stand_by(probe: Object, outdated: bool, complete: bool) -> None:
     """Keeps the patch where it was, because there is no touch now, and lets it say whether it is outdated."""
     settings, patch = probe.tactile_probe, patch_of(probe)
     if complete:
-        anchor.settle(probe, _extent_of(probe))
+        anchor.settle(probe, patch_record.extent_of(patch))
     if patch is None:
         if settings.digest and not settings.message:
             settings.message = "The probe has no patch: touch again for one, or delete the probe too"
         return
     anchor.carry(probe, patch)
     patch_record.hold(patch)
-    record = record_of(patch)
-    if settings.message and record is not None and patch_record.VERDICT not in patch:
+    if settings.message and record_of(patch) is not None and patch_record.VERDICT not in patch:
         settings.message = ""  # There was no patch, and undo has brought it back.
     if outdated:
         patch_record.mark_outdated(
@@ -106,11 +106,9 @@ def stand_by(probe: Object, outdated: bool, complete: bool) -> None:
 
 def _left_contours(probe: Object) -> Object | None:
     """The contours of a patch that was deleted, if they are still there, or None."""
-    objects: Iterable[Object] = bpy.data.objects
-    lines = (obj for obj in objects if patch_record.CONTOURS in obj and obj.parent is None)
-    own = (obj for obj in lines if obj.is_editable and obj.data is not None)
-    touched, _ = _signed(probe.tactile_probe)
-    return next((obj for obj in own if obj.data.get(DIGEST) == touched), None)
+    left = (obj for obj in all_objects() if patch_record.CONTOURS in obj and obj.parent is None)
+    own = (obj for obj in left if obj.is_editable and obj.data is not None)
+    return next((obj for obj in own if obj.data.get(DIGEST) == _signed(probe.tactile_probe)[0]), None)
 
 
 def touch_at(probe: Object, depsgraph: bpy.types.Depsgraph, complete: bool, **more: Any) -> Touched:
@@ -166,11 +164,11 @@ def may_be_outdated(probe: Object, there: Container[Object]) -> bool:
 
 def is_outdated(probe: Object, depsgraph: bpy.types.Depsgraph) -> bool:
     """Whether the patch is that of other inputs than the probe has, by the digests of both."""
-    (touched, name), made = _signed(probe.tactile_probe), _made(probe)
-    meshes = patch_object.meshes(patch_of(probe))
+    (touched, name), made, patch = _signed(probe.tactile_probe), _made(probe), patch_of(probe)
+    meshes = patch_object.meshes(patch)
     if name != probe.name and (not meshes or any(mesh.users > 1 for mesh in meshes)):
         return True  # It is a copy, which has no patch of its own yet.
-    digest = _digest(probe, depsgraph, anchor.seat(probe, _extent_of(probe)))
+    digest = _digest(probe, depsgraph, anchor.seat(probe, patch_record.extent_of(patch)))
     return any(other != digest for other in (touched, *(block.get(DIGEST) for block in made)))
 
 
@@ -182,7 +180,7 @@ def _made(probe: Object) -> list[bpy.types.ID]:
 
 def _sign(probe: Object, depsgraph: bpy.types.Depsgraph) -> None:
     measure_shape(probe.tactile_probe, depsgraph)
-    probe.tactile_probe.seat = anchor.seat(probe, _extent_of(probe))
+    probe.tactile_probe.seat = anchor.seat(probe, patch_record.extent_of(patch_of(probe)))
     digest = _digest(probe, depsgraph, list(probe.tactile_probe.seat))
     probe.tactile_probe.digest = f"{digest} {probe.name}"
     for block in _made(probe):
@@ -208,11 +206,6 @@ def _digest(probe: Object, depsgraph: bpy.types.Depsgraph, seat: list[float]) ->
         _, _, checksum = settings.shape.partition(" ")
         inputs += [_is_there(target, depsgraph), is_disabled(target), checksum]
     return hashlib.sha1(repr(inputs).encode()).hexdigest()
-
-
-def _extent_of(probe: Object) -> float:
-    patch = patch_of(probe)
-    return 0.0 if patch is None else patch_record.extent_of(patch)
 
 
 def measure_shape(

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The pictures of a report as SVG, without a renderer: colored triangles, histograms, scales."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,12 +17,13 @@ BINS, BAR_WIDTH, HEIGHT = 41, 12, 150  # The number of bars of a histogram, thei
 def triangles(points: Array, corners: Array, colors: Array, marks: ArrayLike = ()) -> str:
     """A picture of triangles (m, 3) between points (n, 2), in colors (m, 3 or 4), with marks (k, 2)."""
     place = fitted(points, PIXELS, 5.0)
+    outlines = ("L".join(f"{x:.1f} {y:.1f}" for x, y in place(points[three])) for three in corners)
     shapes = [
-        f'<path d="M{_pairs(place(points[three]), "L")}Z" fill="{_hex(color)}" stroke="{_hex(color)}"/>'
-        for three, color in zip(corners, colors, strict=True)
+        f'<path d="M{outline}Z" fill="{_hex(color)}" stroke="{_hex(color)}"/>'
+        for outline, color in zip(outlines, colors, strict=True)
     ]
     shapes += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="1.6"/>' for x, y in place(np.reshape(marks, (-1, 2)))]
-    return _picture(shapes)
+    return f'<svg viewBox="0 0 {PIXELS} {PIXELS}" width="{PIXELS}">{"".join(shapes)}</svg>'
 
 
 def histogram(values: Array, weights: Array, limit: float, label: Callable[[float], str]) -> str:
@@ -63,19 +64,11 @@ def scale(limit: float, label: Callable[[float], str], low: float = -1.0) -> str
     return f'<svg viewBox="0 0 {PIXELS} 32" width="{PIXELS}">{"".join([*boxes, *words])}</svg>'
 
 
-def _picture(shapes: Sequence[str]) -> str:
-    return f'<svg viewBox="0 0 {PIXELS} {PIXELS}" width="{PIXELS}">{"".join(shapes)}</svg>'
-
-
 def fitted(points: Array, pixels: float, border: float) -> Callable[[Array], Array]:
     """A function that takes points (n, 2) into the middle of a square picture, with y upward."""
     low, high = points.min(axis=0), points.max(axis=0)
     factor = (pixels - 2.0 * border) / max((high - low).max(), 1e-300)
     return lambda at: pixels / 2.0 + factor * (at - 0.5 * (low + high)) * (1.0, -1.0)
-
-
-def _pairs(points: Iterable[Sequence[float]], between: str) -> str:
-    return between.join(f"{x:.1f} {y:.1f}" for x, y in points)
 
 
 def _hex(color: Sequence[float]) -> str:

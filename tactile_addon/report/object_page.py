@@ -11,7 +11,7 @@ import numpy as np
 from ..scene import patch_record
 from ..scene.attributes import DEVIATION, POSITION
 from ..scene.colors import shades, symmetric_range
-from ..scene.mesh_data import values
+from ..scene.mesh_data import corners_of, values
 from ..touch.arrays import read_array
 from ..touch.types import Object
 from ..touch.units import Unit
@@ -40,17 +40,17 @@ def object_page(obj: Object) -> str:
 
 
 def _pictures(mesh: bpy.types.Mesh, unit: Unit, shown: str) -> str:
-    shown_values = values(mesh, shown).astype(float)
-    limit = symmetric_range(shown_values, parts.LEAST_RANGE)
+    found = values(mesh, shown)
+    limit = symmetric_range(found, parts.LEAST_RANGE)
     low = 0.0 if shown in patch_record.POSITIVE else -1.0
     scale = page.figure(drawing.scale(limit, parts.label(1, unit), low), SCALE_WORDS[shown])
-    colors = shades(shown_values, limit)[read_array(mesh.loops, "vertex_index", dtype=np.int32)]
-    return page.section("Pictures", *views.three_sides(mesh, colors), scale)
+    shown_colors = shades(found, limit)[read_array(mesh.loops, "vertex_index", dtype=np.int32)]
+    return page.section("Pictures", *views.three_sides(mesh, shown_colors), scale)
 
 
 def _deviations(mesh: bpy.types.Mesh, record: Mapping[str, Any]) -> list[str]:
-    unit, off = unit_of(record), values(mesh, DEVIATION).astype(float)
-    areas = parts.vertex_areas(values(mesh, POSITION).astype(float), parts.corners(mesh))
+    unit, off = unit_of(record), values(mesh, DEVIATION)
+    areas = parts.vertex_areas(values(mesh, POSITION), corners_of(mesh))
     reaches = [(f"± {times:g} × the tolerance", times * record["tolerance"]) for times in TOLERANCES]
     words = "Shares of the area by its distance from the mesh. The outermost bars count all larger distances."
     return [

@@ -11,9 +11,9 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ...core.triangles import triangle_cross
 from ..scene.colors import symmetric_range
 from ..touch import units
-from ..touch.arrays import read_array
 from ..touch.types import Array
 from ..touch.units import Unit
 from . import drawing, page
@@ -49,14 +49,10 @@ def bands(
         return name, units.say(reach, 1, unit), f"{100.0 * within:.1f} %", due
 
     rows = [row(*reach) for reach in reaches]
-    for count, due in NORMAL_SHARES:
-        rows.append(
-            row(
-                f"± {count:g} standard deviation{'s' if count > 1.0 else ''}",
-                count * std,
-                f"{100.0 * due:g} %",
-            )
-        )
+    rows += [
+        row(f"± {count:g} standard deviation{'s' if count > 1.0 else ''}", count * std, f"{100.0 * due:g} %")
+        for count, due in NORMAL_SHARES
+    ]
     return page.table(rows, ("band", "", "within it", "expected, if normal"))
 
 
@@ -75,6 +71,7 @@ def label(power: int, unit: Unit) -> Callable[[float], str]:
 
 
 def _settings(record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """(label, value) of the settings that a record has."""
     names = ("method", "degree", "tolerance", "most", "spacing", "extent", "step", "noise", "seed")
     rows = [(WORDS.get(name, name), _setting(name, record[name])) for name in names if name in record]
     planes = [f"{azimuth:.0f}° leaning {tilt:.0f}°" for azimuth, tilt in record.get("planes", ())]
@@ -88,6 +85,7 @@ def _setting(name: str, value: Any) -> str:
 
 
 def _versions() -> list[tuple[str, str]]:
+    """(name, version) of the programs behind a page."""
     import scipy
 
     return [
@@ -99,13 +97,7 @@ def _versions() -> list[tuple[str, str]]:
     ]
 
 
-def corners(mesh: bpy.types.Mesh) -> Array:
-    """The triangles (m, 3) of a mesh that has no other faces."""
-    return read_array(mesh.loops, "vertex_index", dtype=np.int32).reshape(-1, 3)
-
-
 def vertex_areas(points: Array, triangles: Array) -> Array:
     """A third of the area (n,) of the triangles (m, 3) at each of points (n, 3)."""
-    a, b, c = (points[triangles[:, i]] for i in range(3))
-    thirds = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
+    thirds = np.linalg.norm(triangle_cross(points[triangles]), axis=1) / 6.0
     return np.bincount(triangles.ravel(), np.repeat(thirds, 3), len(points))

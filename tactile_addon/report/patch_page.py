@@ -3,7 +3,7 @@
 """The page of a patch: pictures along its normal, and how far the mesh or the contacts are from it."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import bpy
 import numpy as np
@@ -12,13 +12,14 @@ from ... import core
 from ..scene import patch_record
 from ..scene.attributes import DEVIATION, POSITION
 from ..scene.colors import shades, symmetric_range
-from ..scene.mesh_data import values
+from ..scene.mesh_data import corners_of, values
 from ..touch import units
 from ..touch.types import Array, Object
 from ..touch.units import Unit
 from ..touch.wording import readable_rows, verdict
 from . import drawing, page, parts
 
+OUTERMOST = "The outermost bars count all larger distances."
 SHOWN = (
     ("gaussian_curvature", "Gaussian curvature", -2),
     ("height_std", "standard deviation of the height", 1),
@@ -26,25 +27,16 @@ SHOWN = (
 )
 
 
-class Deviations(NamedTuple):
-    """Signed lengths (n,), their weights (n,), and words for what was measured."""
-
-    lengths: Array
-    weights: Array
-    words: str
-
-
 def patch_page(patch: Object, r: core.Reconstruction) -> str:
     """The page of a patch object and its core.Reconstruction."""
     record = patch[patch_record.RECORD].to_dict()
     unit = units.unit_of(bpy.context.scene, r.radius)
-    off = _deviations(patch, r, record)
-    reaches = parts.shares_of(r.radius, "radius")
-    bands = parts.bands(off.lengths, off.weights, r.mean_height_std, unit, reaches)
+    off, weights, words = _deviations(patch, r, record)
+    bands = parts.bands(off, weights, r.mean_height_std, unit, parts.shares_of(r.radius, "radius"))
     sections = [
         page.verdict(f"{verdict(record, unit)}. {record['message']}", record["status"] == "ok"),
         page.section("Pictures", *_pictures(patch, r, record, unit)),
-        page.section("Deviations", parts.spread(off.lengths, off.weights, unit, off.words)),
+        page.section("Deviations", parts.spread(off, weights, unit, words)),
         page.section("Tolerance bands", bands),
         *parts.ending(readable_rows(record), record),
     ]
@@ -52,7 +44,7 @@ def patch_page(patch: Object, r: core.Reconstruction) -> str:
 
 
 def _pictures(patch: Object, r: core.Reconstruction, record: Mapping[str, Any], unit: Unit) -> Iterator[str]:
-    points, corners = values(patch.data, POSITION).astype(float), parts.corners(patch.data)
+    points, corners = values(patch.data, POSITION), corners_of(patch.data)
     contacts = r.contacts[:, :2] * record["radius"] / r.radius  # The object's mesh has this scale.
     for attribute, title, power in SHOWN if _has_mesh(record) else SHOWN[:-1]:
         shown, low = values(patch.data, attribute), 0.0 if attribute in patch_record.POSITIVE else -1.0
@@ -67,18 +59,12 @@ def _has_mesh(record: Mapping[str, Any]) -> bool:
     return bool(record.get("vertices") or record.get("verification"))
 
 
-def _deviations(patch: Object, r: core.Reconstruction, record: Mapping[str, Any]) -> Deviations:
+def _deviations(patch: Object, r: core.Reconstruction, record: Mapping[str, Any]) -> tuple[Array, Array, str]:
+    """Signed distances (n,) of the patch from mesh or contacts, their weights (n,), and words for them."""
     if _has_mesh(record):
-        points, corners = values(patch.data, POSITION).astype(float), parts.corners(patch.data)
-        words = (
-            "Shares of the patch's area by its distance from the mesh. The outermost bars count all "
-            "larger distances."
-        )
-        off = values(patch.data, DEVIATION).astype(float)
-        return Deviations(off, parts.vertex_areas(points, corners), words)
+        points, corners = values(patch.data, POSITION), corners_of(patch.data)
+        words = "Shares of the patch's area by its distance from the mesh."
+        return values(patch.data, DEVIATION), parts.vertex_areas(points, corners), f"{words} {OUTERMOST}"
     x, y, z = r.contacts.T
-    words = (
-        "Shares of the contacts by the patch's height above them. The outermost bars count all "
-        "larger distances."
-    )
-    return Deviations(r.height(x, y) - z, np.ones(len(x)), words)
+    words = "Shares of the contacts by the patch's height above them."
+    return r.height(x, y) - z, np.ones(len(x)), f"{words} {OUTERMOST}"

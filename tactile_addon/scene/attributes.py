@@ -7,9 +7,7 @@ from typing import Any
 import bpy
 
 DOMAIN: Any = "POINT"  # Each vertex has a value.
-CORNERS: Any = (
-    "CORNER"  # Each corner of a face has a color, as on whole objects, whose walls meet at creases.
-)
+CORNERS: Any = "CORNER"  # Each corner of a face has a color: on whole objects walls meet at creases.
 POSITION = "position"  # Blender's own.
 CURVATURES = ("gaussian_curvature", "mean_curvature", "shape_index", "curvedness")
 # Those of a whole object have deviations, too, which are infinite where its curvatures are unknown.

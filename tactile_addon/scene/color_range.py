@@ -51,7 +51,7 @@ def set_range(patch: Object, limit: float) -> None:
 
 def _record(obj: Object) -> Any:
     """The report of a patch or a whole object, or None."""
-    return obj[ATLAS_RECORD] if ATLAS_RECORD in obj else report_of(obj) if RECORD in obj else None
+    return obj[ATLAS_RECORD] if ATLAS_RECORD in obj else report_of(obj)
 
 
 def _get(obj: Object) -> float:

@@ -50,9 +50,9 @@ def fill_contours(mesh: bpy.types.Mesh, touched: Touched) -> None:
         _across(path) if contour.plane_normal is None else frame.axes.T @ contour.plane_normal
         for path, contour in zip(contours, result.contours, strict=True)
     ]
-    paths = [*contours, _rim(result)]  # The rim sets a flat patch off from a flat face below it.
-    form = _form(tuple(len(path) for path in paths), len(strokes))
+    paths = [*contours, rim(result)]  # The rim sets a flat patch off from a flat face below it.
     lengths = [len(path) for path in paths]
+    form = _form(tuple(lengths), len(strokes))
     sizes = np.repeat(thickness * np.array([*(1.0 for _ in contours), RIM_THICKNESS]), lengths)
     tubes = _tubes(np.vstack(paths), np.repeat([*across, (0.0, 0.0, 1.0)], lengths, axis=0), sizes, form)
     points = np.vstack([tubes, _octahedra(contours, frame.to_local(strokes), thickness)])
@@ -75,7 +75,7 @@ def _reach(path: Array, thickness: float) -> float:
     return min(max(GAP * apart, LEAST_TIP * thickness), TIP * thickness)
 
 
-def _rim(result: core.Reconstruction) -> Array:
+def rim(result: core.Reconstruction) -> Array:
     """The closed path (n, 3) around a patch, in its Darboux frame."""
     edge = result.domain.boundary(RIM_CORNERS)
     edge = np.vstack([edge, edge[:1]])

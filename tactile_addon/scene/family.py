@@ -1,17 +1,24 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The children of objects. Blender looks through all objects for those of one; this looks once for many."""
+"""All objects of the file, and the children of each.
 
-from collections.abc import Iterator
+Blender looks through all objects for the children of one; this looks once for many.
+"""
+
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 import bpy
 
 from ..touch.types import Object
 
-_remembered: dict[Object, list[Object]] | None = (
-    None  # Within `remembered`, the children by their parents; empty until it is needed.
-)
+# Within `remembered`, the children by their parents; empty until it is needed.
+_remembered: dict[Object, list[Object]] | None = None
+
+
+def all_objects() -> Iterable[Object]:
+    """All objects of the file, with the custom properties that Blender's stubs do not know."""
+    return bpy.data.objects
 
 
 def children_of(obj: Object) -> list[Object]:

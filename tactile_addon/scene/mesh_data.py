@@ -23,7 +23,8 @@ def fill(
 
     If it has these triangles already, only coordinates and values are written.
     """
-    if not _has_triangles(mesh, len(points), triangles):
+    is_alike = (len(mesh.vertices), len(mesh.loops)) == (len(points), triangles.size)
+    if not (is_alike and np.array_equal(corners_of(mesh), triangles)):
         mesh.clear_geometry()
         mesh.vertices.add(len(points))
         mesh.loops.add(triangles.size)
@@ -62,10 +63,9 @@ def own_mesh(obj: Object) -> None:
         note_copied(obj, shared)
 
 
-def _has_triangles(mesh: bpy.types.Mesh, count: int, triangles: Array) -> bool:
-    if (len(mesh.vertices), len(mesh.loops)) != (count, triangles.size):
-        return False
-    return np.array_equal(read_array(mesh.loops, "vertex_index", dtype=np.int32), triangles.ravel())
+def corners_of(mesh: bpy.types.Mesh) -> Array:
+    """The indices (m, 3) of the corners of the triangles of a mesh that has no other faces."""
+    return read_array(mesh.loops, "vertex_index", dtype=np.int32).reshape(-1, 3)
 
 
 def emission(

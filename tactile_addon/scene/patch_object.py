@@ -25,6 +25,7 @@ from .patch_record import (
     _place_contours,
     contours_of,
     matrix_of,
+    parts_of,
     place,
 )
 from .shown import recolor, settle
@@ -87,7 +88,7 @@ def remove_meshes(meshes: Iterable[bpy.types.Mesh]) -> None:
 def rewrite(patch: Object, touched: Touched) -> None:
     """Changes the patch, and its contours if they are still there, to those of another touch, in place."""
     lines = contours_of(patch)
-    for obj in filter(None, (patch, lines)):
+    for obj in parts_of(patch):
         own_mesh(obj)
     if touched.report["is_verified"] or PLACE not in patch.data.attributes:
         _fill_patch(patch, touched)
@@ -99,15 +100,14 @@ def rewrite(patch: Object, touched: Touched) -> None:
         _place_contours(lines)
         names["contours"] = lines.name
     place(patch, Matrix(matrix_of(touched.result.frame.axes, touched.result.frame.origin).tolist()))
-    for obj in filter(None, (patch, lines)):
+    for obj in parts_of(patch):
         obj[ABOVE] = _above(patch, touched)
     patch[RECORD] = touched.report | names
     patch.pop(RECONSTRUCTION, None)
     patch.pop(VERDICT, None)
-    if touched.report["is_verified"]:
-        patch[RECONSTRUCTION] = json.dumps(core.to_dict(touched.result), allow_nan=False)
     recolor(patch)
     if touched.report["is_verified"]:
+        patch[RECONSTRUCTION] = json.dumps(core.to_dict(touched.result), allow_nan=False)
         settle(patch)
 
 
@@ -121,8 +121,7 @@ def _above(patch: Object, touched: Touched) -> float:
 
 def meshes(patch: Object | None) -> list[bpy.types.Mesh]:
     """The meshes of a patch object and of its contours; an empty list if `patch` is None."""
-    objects = [] if patch is None else [patch, contours_of(patch)]
-    return [obj.data for obj in objects if obj is not None]
+    return [obj.data for obj in parts_of(patch)]
 
 
 def collection(scene: bpy.types.Scene) -> bpy.types.Collection:
@@ -144,7 +143,7 @@ def collection(scene: bpy.types.Scene) -> bpy.types.Collection:
 
 def _fill_patch(obj: Object, touched: Touched) -> None:
     """Fills the mesh with the patch in its Darboux frame; deviations are 0 until the patch is verified."""
-    result, frame, mesh = touched.result, touched.result.frame, obj.data
+    result, frame = touched.result, touched.result.frame
     points, triangles = result.mesh()
     d = result.geometry.derivatives(*points[:, :2].T)
     deviation = np.zeros(len(points))
@@ -160,7 +159,7 @@ def _fill_patch(obj: Object, touched: Touched) -> None:
         (PLACE, places),
         (COLOR, np.ones((len(points), 4))),
     ]
-    fill(mesh, points, triangles, attributes)
+    fill(obj.data, points, triangles, attributes)
 
 
 def _follow(obj: Object, touched: Touched) -> None:

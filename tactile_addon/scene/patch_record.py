@@ -59,19 +59,13 @@ def report_of(patch: Object) -> TouchReport | None:
     return report if good and numbers[0] > 0.0 and all(isinstance(word, str) for word in words) else None
 
 
-def extent_of(patch: Object) -> float:
-    """The extent in the report of a patch, which need not be complete; 0 if there is none."""
+def extent_of(patch: Object | None) -> float:
+    """The extent in the report of a patch, which need not be complete; 0 if there is no patch or extent."""
     try:
         extent = patch[RECORD]["extent"]
     except (KeyError, TypeError):
         return 0.0
     return extent if isinstance(extent, float) else 0.0
-
-
-def require_whole(patch: Object) -> None:
-    """Raises ValueError if the patch object was edited such that it is no patch any more."""
-    if report_of(patch) is None or not (patch.type == "MESH" and _is_whole(patch)):
-        raise edited(patch)
 
 
 def edited(obj: Object) -> ValueError:
@@ -92,12 +86,12 @@ def reading(obj: Object) -> Iterator[None]:
 
 def is_colored(obj: Object) -> bool:
     """Whether an object is a patch or a whole object that nobody has edited, so that it can show colors."""
-    is_one = ATLAS_RECORD in obj or (RECORD in obj and report_of(obj) is not None)
+    is_one = ATLAS_RECORD in obj or report_of(obj) is not None
     return is_one and obj.type == "MESH" and _is_whole(obj)
 
 
 def require_colored(obj: Object) -> None:
-    """Raises ValueError if the whole object was edited such that it cannot show its colors."""
+    """Raises ValueError if the patch or whole object was edited such that it is none any more."""
     if not is_colored(obj):
         raise edited(obj)
 
@@ -136,7 +130,7 @@ def reconstruction_of(patch: Object) -> core.Reconstruction:
     If the object was not moved, it is what was fitted, to the last bit. Raises ValueError during a gesture,
     if the object's properties were edited, and if it no longer has its shape.
     """
-    require_whole(patch)
+    require_colored(patch)
     if RECONSTRUCTION not in patch:
         raise ValueError(f'"{patch.name}" is not complete: end the gesture, or touch again')
     try:
@@ -214,6 +208,11 @@ def is_at(patch: Object, axes: Array, origin: Array) -> bool:
 def contours_of(patch: Object) -> Object | None:
     """The contours of a patch object, or None."""
     return next((child for child in children_of(patch) if CONTOURS in child), None)
+
+
+def parts_of(patch: Object | None) -> list[Object]:
+    """The patch object and its contours, if it has any; an empty list if `patch` is None."""
+    return [] if patch is None else list(filter(None, (patch, contours_of(patch))))
 
 
 def matrix_of(axes: Array, origin: Array) -> Array:

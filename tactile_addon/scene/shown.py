@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How patches and whole objects are shown: their colors, and patches that are near or over each other."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import bpy
@@ -14,6 +14,7 @@ from ..touch.touch_report import TouchReport
 from ..touch.types import Array, Object
 from . import colors
 from .attributes import COLOR, CURVATURE_STD, CURVATURES, DEVIATION, GAUSSIAN_STD, POSITION
+from .family import all_objects
 from .mesh_data import ABOVE, own_mesh, values
 from .patch_record import (
     ATLAS_RECORD,
@@ -21,8 +22,8 @@ from .patch_record import (
     POWERS,
     RANGE,
     RECORD,
-    contours_of,
     is_colored,
+    parts_of,
 )
 
 # The range of colors is no smaller, so that a plane is pale green: in units of the radius,
@@ -58,8 +59,7 @@ def recolor(obj: Object) -> None:
     common = max(obj.get(COMMON_RANGE, 0.0), _error_range(mesh, shown, unknown, floor))
     limit = obj.get(RANGE) or max(record["own_limit"], common)
     rgba = colors.diverging(np.append(shades, 0.0), limit, [len(shades)])
-    is_whole = ATLAS_RECORD in obj
-    at = _corners_shown(mesh, unknown, record["edge"]) if is_whole else np.arange(len(shades))
+    at = np.arange(len(shades)) if RECORD in obj else _corners_shown(mesh, unknown, record["edge"])
     mesh.attributes[COLOR].data.foreach_set("color", rgba[at].ravel())
     record["is_gray"] = bool((at < 0).any())
     if mesh.color_attributes.active_color_name != COLOR or mesh.color_attributes.default_color_name != COLOR:
@@ -132,24 +132,24 @@ def _draw_above(patch: Object, others: list[Object]) -> None:
         below = [each for each in (patch, *others) if each.get(LAYER, 0) < obj[LAYER]]
         below = [each for each in below if _overlap(obj[RECORD], each[RECORD])]
         height = max((_height(each) + _layer(obj, each) for each in below), default=_above_surfaces(obj))
-        for part in filter(None, (obj, contours_of(obj))):
+        for part in parts_of(obj):
             _lift(part, height)
 
 
 def settle_on(surface: Object) -> None:
     """Draws all patches of its mesh above the surface of a whole object, which is in the same place."""
-    source, objects = surface[ATLAS_RECORD]["source"], [*bpy.data.objects]
-    for patch in (obj for obj in objects if RECORD in obj and obj[RECORD]["source"] == source):
+    source = surface[ATLAS_RECORD]["source"]
+    for patch in [obj for obj in all_objects() if RECORD in obj and obj[RECORD]["source"] == source]:
         if patch.is_editable and is_colored(patch):
             settle(patch)
 
 
 def _above_surfaces(patch: Object) -> float:
     """How far above the surfaces of whole objects a patch is drawn; 0 if its mesh has none."""
-    objects: Iterable[Object] = bpy.data.objects
-    source = patch[RECORD]["source"]
-    surfaces = (obj for obj in objects if ATLAS_RECORD in obj and obj[ATLAS_RECORD]["source"] == source)
-    return max((_apart(patch[RECORD], obj[ATLAS_RECORD]) for obj in surfaces), default=0.0)
+    report = patch[RECORD]
+    surfaces = (obj[ATLAS_RECORD] for obj in all_objects() if ATLAS_RECORD in obj)
+    here = (_apart(report, surface) for surface in surfaces if surface["source"] == report["source"])
+    return max(here, default=0.0)
 
 
 def _apart(upper: Mapping[str, Any], lower: Mapping[str, Any]) -> float:
@@ -192,9 +192,8 @@ def _overlap(a: TouchReport, b: TouchReport) -> bool:
 
 def _others(patch: Object) -> list[Object]:
     """All other patches whose colors can be changed without a copy of their meshes."""
-    objects: Iterable[Object] = bpy.data.objects
     return [
         obj
-        for obj in objects
+        for obj in all_objects()
         if RECORD in obj and obj != patch and obj.is_editable and is_colored(obj) and obj.data.users == 1
     ]

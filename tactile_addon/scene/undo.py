@@ -18,12 +18,10 @@ from ..touch.types import Object
 
 _is_late = False
 _added: set[int] = set()  # The session_uids of objects and collections that were added.
-_replaced: dict[
-    int, int
-] = {}  # The session_uids of meshes, by those of the copies that have taken their places.
-_links: list[
-    tuple[Any, ...]
-] = []  # Links that were taken out: a function that puts one back, and session_uids.
+# The session_uids of meshes, by those of the copies that have taken their places.
+_replaced: dict[int, int] = {}
+# Links that were taken out: a function that puts one back, and the session_uids of its arguments.
+_links: list[tuple[Any, ...]] = []
 
 
 @contextmanager
@@ -55,8 +53,7 @@ def take_out(*_: Any) -> None:
     _links.clear()
     if not (_added or _replaced):
         return
-    added = [obj for obj in bpy.data.objects if obj.session_uid in _added]
-    for obj in added:
+    for obj in [obj for obj in bpy.data.objects if obj.session_uid in _added]:
         for child in obj.children:
             _links.append((_set_parent, child.session_uid, obj.session_uid))
             child.parent = None
@@ -81,43 +78,34 @@ def _give_back_meshes() -> None:
 
 def put_back() -> None:
     """Links again what is still there. It must be called after undo and redo, and in another file."""
+    datablocks: Iterable[Any] = (*bpy.data.objects, *bpy.data.meshes) if _links else ()
+    there = {block.session_uid: block for block in datablocks} | _collections()
     for function, *numbers in reversed(_links):
-        function(*numbers)
+        if all(number in there for number in numbers):
+            function(*(there[number] for number in numbers))
     _links.clear()
     _added.clear()
     _replaced.clear()
 
 
-def _set_mesh(obj: int, copy: int, before: int) -> None:
-    owner, mesh = _object(obj), _found(bpy.data.meshes, copy)
-    if owner is not None and mesh is not None and owner.data.session_uid == before:
-        owner.data = mesh
+def _set_mesh(obj: Object, copy: bpy.types.Mesh, before: bpy.types.Mesh) -> None:
+    if obj.data == before:
+        obj.data = copy
 
 
-def _set_parent(child: int, parent: int) -> None:
-    below, above = _object(child), _object(parent)
-    if below is not None and above is not None and below.parent is None:
-        below.parent = above
+def _set_parent(child: Object, parent: Object) -> None:
+    if child.parent is None:
+        child.parent = parent
 
 
-def _link_object(obj: int, collection: int) -> None:
-    found, above = _object(obj), _collections().get(collection)
-    if found is not None and above is not None and not found.users_collection:
-        above.objects.link(found)
+def _link_object(obj: Object, collection: bpy.types.Collection) -> None:
+    if not obj.users_collection:
+        collection.objects.link(obj)
 
 
-def _link_collection(collection: int, above: int) -> None:
-    child, parent = _collections().get(collection), _collections().get(above)
-    if child is not None and parent is not None and child.name not in parent.children:
-        parent.children.link(child)
-
-
-def _object(number: int) -> Object | None:
-    return _found(bpy.data.objects, number)
-
-
-def _found(datablocks: Iterable[Any], number: int) -> Any:
-    return next((block for block in datablocks if block.session_uid == number), None)
+def _link_collection(collection: bpy.types.Collection, above: bpy.types.Collection) -> None:
+    if collection.name not in above.children:
+        above.children.link(collection)
 
 
 def _collections() -> dict[int, bpy.types.Collection]:

@@ -27,27 +27,23 @@ def has_gesture() -> bool:
     return any(name.startswith(GESTURES) or "_move" in name for name in names)
 
 
-def show_colors(chosen: Any = None) -> None:
-    """Makes a viewport, and all that nobody has set otherwise, draw the colors of vertices in Solid shading.
+def _viewports() -> Iterator[Any]:
+    """The spaces of all 3D viewports. A file made without a window has some, too, in which it is opened."""
+    areas = (area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D")
+    return (area.spaces.active for area in areas)
 
-    A file that is made without a window also has viewports, in which it will be opened.
-    """
-    areas: Iterator[Any] = (
-        area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D"
-    )
-    for shading in (area.spaces.active.shading for area in areas):
-        if shading.color_type == "MATERIAL":
-            shading.color_type = "VERTEX"
+
+def show_colors(chosen: Any = None) -> None:
+    """Makes a viewport, and all that nobody has set otherwise, draw colors of vertices in Solid shading."""
+    for space in _viewports():
+        if space.shading.color_type == "MATERIAL":
+            space.shading.color_type = "VERTEX"
     if chosen is not None and chosen.type == "VIEW_3D":
         chosen.shading.color_type = "VERTEX"
 
 
 def show_size(size: float) -> None:
     """Makes all viewports show an object of this size from near by and from afar, if they do not yet."""
-    if not size > 0.0:
-        return
-    areas = (area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D")
-    for area in areas:
-        space: Any = area.spaces.active
+    for space in _viewports() if size > 0.0 else ():
         space.clip_start = min(max(space.clip_start, min(COARSE * size, OWN)), NEAREST * size)
         space.clip_end = max(space.clip_end, FARTHEST * size)

@@ -90,10 +90,15 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         row.prop(settings, "live", text="Live" if settings.live else "Live (Frozen)")
         row.operator(TACTILE_OT_update.bl_idname, text="", icon="FILE_REFRESH")
         for identifier, title, draw in (("sensor", "Sensor", draw_sensor), ("solver", "Fit", draw_solver)):
-            header, body = layout.panel(f"TACTILE_PT_{identifier}", default_closed=True)
-            header.label(text=title)
-            if body:
+            if body := _folded(layout, identifier, title):
                 draw(body, settings, chosen, fields)
+
+
+def _folded(layout: bpy.types.UILayout, identifier: str, title: str) -> bpy.types.UILayout | None:
+    """Draws the header of a part that is folded away at first; returns its layout, or None while it is."""
+    header, body = layout.panel(f"TACTILE_PT_{identifier}", default_closed=True)
+    header.label(text=title)
+    return body
 
 
 def _draw_pick(context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
@@ -201,8 +206,7 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         text = f"Largest {'Gap' if record['uncovered'] else 'Deviation'}: {deviation(record, 'max')}"
         layout.operator(TACTILE_OT_look_farthest.bl_idname, text=text, icon="ZOOM_SELECTED", translate=False)
         layout.operator(TACTILE_OT_mesh_again.bl_idname, icon="MOD_REMESH")
-        row = layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Surface", icon="EYEDROPPER")
-        row.new = True
+        layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Surface", icon="EYEDROPPER").new = True
 
 
 class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
@@ -224,24 +228,17 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
         if medians:
             box.label(text="Medians of the Patches")
             draw_rows(context, box, medians)
-        if more:
-            header, body = layout.panel("TACTILE_PT_medians", default_closed=True)
-            header.label(text="More")
-            if body:
-                draw_rows(context, body, more)
+        if more and (body := _folded(layout, "medians", "More")):
+            draw_rows(context, body, more)
 
 
 def _draw_details(
     context: bpy.types.Context, layout: bpy.types.UILayout, record: Mapping[str, Any], unit: Unit
 ) -> None:
     """Draws what the fit says of itself, and all other numbers, folded away."""
-    header, body = layout.panel("TACTILE_PT_why", default_closed=True)
-    header.label(text="Reasons")
-    if body:
+    if body := _folded(layout, "why", "Reasons"):
         draw_sentence(context, body, record["message"], ICONS.get(record["status"], "ERROR"))
-    header, body = layout.panel("TACTILE_PT_numbers", default_closed=True)
-    header.label(text="More Numbers")
-    if body:
+    if body := _folded(layout, "numbers", "More Numbers"):
         draw_rows(context, body, other_rows(record, unit), active=record["status"] != "outdated")
 
 
@@ -266,10 +263,9 @@ def _draw_range(context: bpy.types.Context, layout: bpy.types.UILayout, patch: O
 
 def _draw_shown(layout: bpy.types.UILayout, found: Object | None, patch: Object) -> None:
     """Draws the switches of what is shown with a patch and may hide it."""
-    lines = patch_record.contours_of(patch)
     row = layout.row(align=True)
     row.use_property_split = False
-    if lines is not None:
+    if patch_record.contours_of(patch) is not None:
         row.prop(patch, "tactile_contours", icon="CURVE_DATA", toggle=1)
     if found is not None:
         row.prop(found.tactile_probe, "show_handles", icon="GIZMO", toggle=1)

@@ -18,18 +18,17 @@ ZERO = 1e-6  # A number below this, in unit radius, counts as 0.
 
 def main_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     """(label, value) of what matters most, with lengths in a unit of units.py."""
-    mesh = rim = "…"
-    if "height_std_rim" in record:
-        rim = "± " + units.say(record["height_std_rim"], 1, unit)
+    rim = record.get("height_std_rim")
+    misfit = "…"
     if record["is_verified"]:
-        mesh = _said(record, "height_error", 1, unit) if "height_error" in record else "–"
+        misfit = _said(record, "height_error", 1, unit) if "height_error" in record else "–"
     return [
         ("Principal Curvatures", ""),
         ("κ1", _measured(record, "k1", -1, unit)),
         ("κ2", _measured(record, "k2", -1, unit)),
-        ("Height", "± " + units.say(record["height_std"], 1, unit)),
-        ("At the Rim", rim),
-        ("Misfit", mesh),
+        ("Height", f"± {units.say(record['height_std'], 1, unit)}"),
+        ("At the Rim", "…" if rim is None else f"± {units.say(rim, 1, unit)}"),
+        ("Misfit", misfit),
     ]
 
 
@@ -71,6 +70,7 @@ def found_values(record: Mapping[str, Any] | None, scene: bpy.types.Scene) -> di
 
 
 def _said(record: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
+    """A value of the record, which is in length^power, in words."""
     return units.say(_value(record, key, power), power, unit)
 
 
@@ -81,11 +81,12 @@ def _shape_index(record: Mapping[str, Any]) -> str:
 
 
 def _measured(record: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
+    """A value of the record, which is in length^power, in words with its standard deviation."""
     return units.say(_value(record, key, power), power, unit, record[f"{key}_std"])
 
 
 def _value(record: Mapping[str, Any], key: str, power: int) -> float:
-    # In single precision a little is left of 0.
+    """A value of the record, which is in length^power; what single precision leaves of 0 is 0."""
     return record[key] if abs(record[key]) > ZERO * record["radius"] ** power else 0.0
 
 

@@ -142,13 +142,10 @@ def touched_near(painted: Object, location: list[float]) -> list[float]:
 
     It is the location itself if that point is farther away than the map is large: the target was moved.
     """
-    if PLACES not in painted:
-        return location
-    places = _applied(_array(painted.matrix_world), np.reshape(painted[PLACES], (-1, 3)))
+    places = _applied(_array(painted.matrix_world), np.reshape(painted.get(PLACES, ()), (-1, 3)))
     away = np.linalg.norm(places - np.array(location), axis=1)
-    nearest = int(np.argmin(away)) if len(away) else None
-    is_near = nearest is not None and away[nearest] <= max(painted.dimensions)
-    return places[nearest].tolist() if is_near else location
+    is_near = len(away) > 0 and away.min() <= max(painted.dimensions)
+    return places[np.argmin(away)].tolist() if is_near else location
 
 
 def _array(matrix: Any) -> Array:

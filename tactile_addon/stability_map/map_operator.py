@@ -6,19 +6,18 @@ import bpy
 
 from ...core.arguments import many
 from ..probes import probe
-from ..probes.in_slices import InSlices, Progress
+from ..probes.in_slices import AllOver, Progress
 from ..probes.number_fields import dragged
 from ..probes.operators import (
-    fields_of,
     has_target,
     is_in_object_mode,
     make_active,
+    report_done,
     target_object,
 )
 from ..scene import patch_record
 from ..touch.settings import (
     NAMES,
-    TARGET,
     TouchSettings,
     draw_all,
     draw_chosen,
@@ -26,21 +25,19 @@ from ..touch.settings import (
     touch_arguments,
 )
 from ..touch.types import Outcome
-from ..touch.wording import sentence
 from . import map_object
 from .map_report import map_summary
 from .stability import StabilityMap, expected_count
 
 
 @dragged
-class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
+class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
     """Touch a mesh all over and paint a copy of it: where a patch can be trusted, and where there is none"""
 
     bl_idname = "tactile.stability_map"
     bl_label = "Stability Map"
     bl_options = {"UNDO", "PRESET"}
 
-    target: TARGET
     spacing: length_property(
         "Spacing",
         "Distance between the points that are touched; 0 uses a quarter of the extent, or a 32nd of the "
@@ -48,7 +45,6 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
     )
 
     stop = "Stop and Keep"
-    meanwhile = {"PASS_THROUGH"}  # The scene may change, because a detached mesh is touched.
     _counted: tuple[object, int] = (None, 0)  # The points that were counted last, after what they depend on.
 
     @classmethod
@@ -59,7 +55,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         found = probe.probe_of(context.view_layer.objects.active)
         for name in NAMES if found is not None and not bpy.app.background else ():
             setattr(self, name, getattr(found.tactile_probe, name))
-        return self._ask(context)
+        return super().invoke(context, event)
 
     def _begin(self, context: bpy.types.Context) -> None:
         self._map = StabilityMap(
@@ -90,27 +86,19 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         painted = map_object.insert(context, target, self._map)
         make_active(context, painted)
         record = painted[patch_record.MAP_RECORD].to_dict()
-        self.report({"INFO"} if record["patches"] else {"WARNING"}, map_summary(record))
-        return {"FINISHED"}
+        return report_done(self, map_summary(record), record["patches"] > 0)
 
     def _about(self, context: bpy.types.Context) -> str:
-        """A sentence on what will be touched at how many points, or on why it cannot be touched."""
-        try:
-            target = target_object(context, self.target)
-            given = target.session_uid, self.extent, self.spacing
-            if given != self._counted[0]:  # A dialog is drawn often.
-                depsgraph = context.evaluated_depsgraph_get()
-                self._counted = given, expected_count(target, depsgraph, self.extent, self.spacing)
-        except ValueError as error:
-            return sentence(error)
+        """A sentence on what will be touched at how many points."""
+        target = target_object(context, self.target)
+        given = target.session_uid, self.extent, self.spacing
+        if given != self._counted[0]:  # A dialog is drawn often.
+            depsgraph = context.evaluated_depsgraph_get()
+            self._counted = given, expected_count(target, depsgraph, self.extent, self.spacing)
         return f"{target.name}: about {many(self._counted[1], 'touch', 'touches')}"
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split, layout.use_property_decorate = True, False
-        layout.prop_search(self, "target", context.scene, "objects")
-        layout.label(text=self._about(context), translate=False)
-        fields = fields_of(context, self.target)
+        layout, fields = self.layout, self._draw_target(context)
         draw_chosen(layout, self, "spacing", fields=fields)
         layout.separator()
         draw_all(layout, self, fields)

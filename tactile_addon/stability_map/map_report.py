@@ -21,15 +21,16 @@ FACETED = 0.5  # The share of the patches from which on a map says that they fol
 
 def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(label, value) of everything there is to say of a map."""
-    refused = ", ".join(f"{key} {count}" for key, count in record["refused"].items())
     unit = units.unit_of(bpy.context.scene, record["spacing"])
     names = ("spacing", "extent", "step")
     lengths = [units.say(record[name], 1, unit) if record[name] else "auto" for name in names]
-    points = many(record["points"], "point", "points")
     return [
-        ("touched", f"{record['source']}, at {record['touched']} of {points}"),
+        (
+            "touched",
+            f"{record['source']}, at {record['touched']} of {many(record['points'], 'point', 'points')}",
+        ),
         ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
-        ("refused", refused),
+        ("refused", ", ".join(f"{key} {count}" for key, count in record["refused"].items())),
         ("fit", f"{record['method']}, degree {record['degree']}"),
         (", ".join(names), ", ".join(lengths)),
         *((f"median {title.lower()}", value) for _, title, value in _medians(record, unit)),

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from ... import core
+from ...core.triangles import triangle_cross
 from ..scene.attributes import MEASURES
 from ..touch.arrays import read_array
 from ..touch.detached_mesh import DetachedMesh
@@ -55,8 +56,7 @@ def expected_count(obj: Object, depsgraph: bpy.types.Depsgraph, extent: float, s
         return count
     # Long or narrow faces have their middles where others leave no room, as on a letter.
     middles = read_array(faces, "center", 3) @ linear.T
-    chosen = core.spaced(middles, spacing, np.random.default_rng(0))
-    return sum(index is not None for index in chosen)
+    return sum(index is not None for index in core.spaced(middles, spacing, np.random.default_rng(0)))
 
 
 class StabilityMap:
@@ -138,9 +138,8 @@ class StabilityMap:
         tree = cKDTree(self.places[: self.done])
         self.touch_of = np.empty(len(points), dtype=np.intp)
         for start in range(0, len(points), NEAREST_AT_ONCE):
-            self.touch_of[start : start + NEAREST_AT_ONCE] = tree.query(
-                points[start : start + NEAREST_AT_ONCE]
-            )[1]
+            some = slice(start, start + NEAREST_AT_ONCE)
+            self.touch_of[some] = tree.query(points[some])[1]
             yield
         self.touch_in = np.full(self.surface.owners.max() + 1, -1)
         self.touch_in[self._touched[: self.done]] = np.arange(self.done)
@@ -215,10 +214,11 @@ class StabilityMap:
             known = values[values != NOTHING].tolist()
             if known:
                 report[f"{name}_median"] = median(known)
-        names = ("spacing", "extent", "step", "noise", "seed")
-        report |= {name: getattr(self, name) for name in names} | self.fit
-        angles = [(plane.azimuth, plane.tilt) for plane in self.planes]
-        return report | {"planes": np.degrees(angles).tolist()}
+        return report | {
+            **{name: getattr(self, name) for name in ("spacing", "extent", "step", "noise", "seed")},
+            **self.fit,
+            "planes": np.degrees([(plane.azimuth, plane.tilt) for plane in self.planes]).tolist(),
+        }
 
 
 def _reason_of(stops: Iterable[str]) -> int:
@@ -233,8 +233,7 @@ def _middles(surface: DetachedMesh) -> Array:
     The middle is within a face even if that is concave. Of equal triangles, as in a quad, it is the first.
     """
     corners, owners = surface.points[surface.triangles], surface.owners
-    a, b, c = corners.swapaxes(0, 1)
-    areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    areas = 0.5 * np.linalg.norm(triangle_cross(corners), axis=1)
     most = np.maximum.reduceat(areas, np.flatnonzero(np.diff(owners, prepend=-1)))
     large = np.flatnonzero(areas >= (1.0 - EQUAL) * most[owners])
     first = large[np.diff(owners[large], prepend=-1) != 0]

@@ -36,7 +36,7 @@ class DetachedMesh(PlacedMesh):
     def __init__(self, obj: Object, depsgraph: bpy.types.Depsgraph) -> None:
         """Raises ValueError, with a sentence, if `obj` cannot be touched."""
         evaluated, linear, _ = evaluated_object(obj, depsgraph)
-        co = coordinates(obj.name, evaluated)
+        co = coordinates(evaluated)
         # It keeps no reference to the object, which somebody may delete.
         self.name, self._uid = obj.name, obj.session_uid
         self._checksum, self.matrix = zlib.crc32(co.data), obj.matrix_world.copy()
@@ -80,7 +80,7 @@ class DetachedMesh(PlacedMesh):
         begin = perf_counter()
         if begin >= self._compared_until:
             evaluated, _, _ = evaluated_object(found, context.evaluated_depsgraph_get())
-            if zlib.crc32(coordinates(found.name, evaluated).data) != self._checksum:
+            if zlib.crc32(coordinates(evaluated).data) != self._checksum:
                 raise ValueError(f'"{self.name}" was changed while it was touched: start again')
             self._compared_until = perf_counter() + PAUSE * (perf_counter() - begin)
         return found

@@ -23,7 +23,7 @@ def checksum_of(obj: Object, depsgraph: bpy.types.Depsgraph) -> int:
     Raises ValueError, with a sentence, if the object cannot be touched.
     """
     evaluated, _, _ = evaluated_object(obj, depsgraph)
-    co = coordinates(obj.name, evaluated)
+    co = coordinates(evaluated)
     try:  # This ray starts beyond everything, so it needs an evaluated mesh, but no tree of its faces.
         evaluated.ray_cast((1e18, 0.0, 0.0), (1.0, 0.0, 0.0), distance=1e-30, depsgraph=depsgraph)
     except RuntimeError as error:
@@ -66,22 +66,26 @@ def evaluated_object(obj: Object, depsgraph: bpy.types.Depsgraph) -> tuple[Objec
     return evaluated, matrix[:3, :3], matrix[:3, 3]
 
 
-def coordinates(name: str, evaluated: Object) -> Array:
+def coordinates(evaluated: Object) -> Array:
     """The coordinates of all vertices in an evaluated object, (n, 3) float32.
 
     Raises ValueError, with a sentence, if any is at a place that cannot be touched.
     """
-    co, matrix = _coordinates(evaluated.data), np.array(evaluated.matrix_world, dtype=float)
+    mesh, matrix = evaluated.data, np.array(evaluated.matrix_world, dtype=float)
+    position: Any = mesh.attributes.get("position")  # It is 30 times as fast. There is none in edit mode.
+    co = read_array(mesh.vertices, "co", 3) if position is None else read_array(position.data, "vector", 3)
     largest = max(float(co.max()), -float(co.min()))  # If any is NaN, both are.
     if not math.isfinite(largest):
         wrong = np.count_nonzero(~np.isfinite(co).all(axis=1))
         raise ValueError(
-            f'"{name}" has vertices whose coordinates are not finite, {wrong} of {len(co)}: delete them, or '
-            "correct its modifiers"
+            f'"{evaluated.name}" has vertices whose coordinates are not finite, {wrong} of {len(co)}: delete '
+            "them, or correct its modifiers"
         )
     reach = np.max([largest, largest * np.abs(matrix[:3, :3]).max(), np.abs(matrix[:3, 3]).max()])
     if not reach <= FARTHEST_VERTEX:  # NaN fails every comparison, so it is refused, too.
-        raise ValueError(f'"{name}" reaches farther than {FARTHEST_VERTEX:g} from the origin: scale it down')
+        raise ValueError(
+            f'"{evaluated.name}" reaches farther than {FARTHEST_VERTEX:g} from the origin: scale it down'
+        )
     return co
 
 
@@ -89,12 +93,6 @@ def size_of(evaluated: Object, linear: Array) -> float:
     """The longest edge of the object's bounding box, in the world."""
     edges = np.ptp(np.array(evaluated.bound_box), axis=0)
     return float((edges * np.linalg.norm(linear, axis=0)).max())
-
-
-def _coordinates(mesh: bpy.types.Mesh) -> Array:
-    """The coordinates of all vertices, (n, 3) float32. If the attribute is there, it is 30 times as fast."""
-    position: Any = mesh.attributes.get("position")  # There is none in edit mode.
-    return read_array(mesh.vertices, "co", 3) if position is None else read_array(position.data, "vector", 3)
 
 
 def require_invertible(name: str, matrix: Array) -> None:

@@ -95,20 +95,6 @@ TARGET = StringProperty(
     description="Name of the mesh object to touch; empty for the active object",
     options=UNSAVED,
 )
-LOCATION = FloatVectorProperty(
-    name="Location",
-    subtype="TRANSLATION",
-    description="Where to touch; if not set, the 3D cursor",
-    options=UNSAVED,
-)
-
-
-OUTWARD = FloatVectorProperty(
-    name="Outward",
-    subtype="XYZ",
-    description="The direction to touch from; if not set, the surface's own normal",
-    options=UNSAVED,
-)
 
 
 def length_property(name: str, description: str, **more: Any) -> Any:
@@ -186,7 +172,30 @@ class TouchSettings(FitSettings):
     )
 
 
+class PlacedTouch(TouchSettings):
+    """The settings of one touch at a place, for operators to inherit."""
+
+    target: TARGET
+    location: FloatVectorProperty(
+        name="Location",
+        subtype="TRANSLATION",
+        description="Where to touch; if not set, the 3D cursor",
+        options=UNSAVED,
+    )
+    outward: FloatVectorProperty(
+        name="Outward",
+        subtype="XYZ",
+        description="The direction to touch from; if not set, the surface's own normal",
+        options=UNSAVED,
+    )
+
+
 NAMES = (*TouchSettings.__annotations__, *FitSettings.__annotations__)
+
+
+def given(operator: Any, name: str) -> list[float] | None:
+    """The components of an operator's vector, or None if it is not set."""
+    return list(getattr(operator, name)) if operator.properties.is_property_set(name) else None
 
 
 def touch_arguments(settings: Any) -> dict[str, Any]:

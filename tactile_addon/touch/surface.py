@@ -23,7 +23,7 @@ class MeshSurface(PlacedMesh):
     """The evaluated mesh of an object, which core.track touches through `ray_cast`.
 
     sound : whether all its vertices are known to be at finite places, which takes time to check
-    size : the longest edge of its bounding box, in the world
+    name : of the object; size : the longest edge of its bounding box, in the world
     """
 
     def __init__(self, obj: Object, depsgraph: bpy.types.Depsgraph, sound: bool = False) -> None:
@@ -31,7 +31,7 @@ class MeshSurface(PlacedMesh):
         try:
             evaluated, linear, origin = evaluated_object(obj, depsgraph)
             if not sound:
-                self._co = coordinates(obj.name, evaluated)
+                self._co = coordinates(evaluated)
             evaluated.ray_cast((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), distance=1e-30, depsgraph=depsgraph)
         except RuntimeError as error:
             raise disabled(obj) from error
@@ -43,11 +43,11 @@ class MeshSurface(PlacedMesh):
 
         super().__init__(linear, origin, cast)
         self._mesh, self._object, self._depsgraph = evaluated.data, evaluated, depsgraph
-        self.size = size_of(evaluated, linear)
+        self.name, self.size = obj.name, size_of(evaluated, linear)
 
     @cached_property
     def _co(self) -> Array:
-        return coordinates(self._object.name, self._object)
+        return coordinates(self._object)
 
     def vertices_near(self, point: Point, radius: float, most: int | None = None) -> tuple[Array, Array]:
         """World coordinates and normals (any length) of vertices within `radius` of a world point.

@@ -78,7 +78,7 @@ def touch(
     clock = [perf_counter()]
     surface = MeshSurface(obj, depsgraph, sound)
     require_lengths(obj.name, surface.size, extent, step, noise)
-    point, surface_normal = nearest_point(obj.name, surface, location, extent or AWAY * surface.size)
+    point, surface_normal = nearest_point(surface, location, extent or AWAY * surface.size)
     require_fine(surface.spacing(point), step or extent / LEAST_STEPS or FINEST_STEP * surface.size)
     outward = unit_vector("outward", surface_normal if outward is None else outward)
     if toward is not None and np.dot(outward, toward) < 0.0:
@@ -117,10 +117,17 @@ def _explored(
     **more: Any,
 ) -> core.Exploration:
     """What core.explore finds. Where long facets stand for a smooth bend, an error says so."""
-    more |= {"farthest": FARTHEST_SHARE * surface.size, "most_planes": MOST_PLANES}
     try:
         return core.explore(
-            surface, point, outward, planes, extent=extent or "auto", step=step or "auto", **more
+            surface,
+            point,
+            outward,
+            planes,
+            extent=extent or "auto",
+            step=step or "auto",
+            farthest=FARTHEST_SHARE * surface.size,
+            most_planes=MOST_PLANES,
+            **more,
         )
     except core.DegenerateCurvesError as error:
         facet = surface.facet(point)
@@ -194,7 +201,7 @@ def require_lengths(name: str, size: float, extent: float, step: float, noise: f
 
 
 def nearest_point(
-    name: str, surface: MeshSurface | DetachedMesh, location: Point, farthest: float
+    surface: MeshSurface | DetachedMesh, location: Point, farthest: float
 ) -> tuple[Triple, Triple]:
     """The point of a surface nearest to a location, and the normal there.
 
@@ -205,8 +212,8 @@ def nearest_point(
     point, normal, distance = surface.project(location)
     if distance > farthest:
         raise ValueError(
-            f'The location is {length(distance)} away from "{name}", farther than {length(farthest)}: '
-            "move it to the surface"
+            f'The location is {length(distance)} away from "{surface.name}", farther than '
+            f"{length(farthest)}: move it to the surface"
         )
     return point, normal
 

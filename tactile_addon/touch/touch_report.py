@@ -146,7 +146,7 @@ def stops_at(contours: Sequence[core.Contour], point: Point | Array, reach: floa
     ]
 
 
-def judgment(result: core.Reconstruction, mean: float, ended: str, few_facets: bool = False) -> TouchReport:
+def judgment(result: core.Reconstruction, mean: float, ended: str, few_facets: bool) -> TouchReport:
     """Status and message, see core.judged_by_mesh; `ended` is added to the fit's own message.
 
     few_facets : see core.has_few_facets
@@ -155,20 +155,21 @@ def judgment(result: core.Reconstruction, mean: float, ended: str, few_facets: b
     """
     status, message = core.judged_by_mesh(result, mean)
     message += ended if message == result.message else ""
-    if stops := stops_at(result.contours, result.frame.origin, AT_POINT * result.radius):
-        status = "uncertain" if status == "ok" else status
+    stops = stops_at(result.contours, result.frame.origin, AT_POINT * result.radius)
+    if status == "ok" and (stops or few_facets):
+        status = "uncertain"
+    if stops:
         where = core.WHERE[Counter(stops).most_common(1)[0][0]]
         message = (
             f"The point is {where}, so half curves end there at once: move the point away from that edge. "
             f"{message}"
         )
-    if not few_facets:
-        return {"status": status, "message": message}
-    return {
-        "status": "uncertain" if status == "ok" else status,
-        "message": "The curves lie on so few facets that the curvature is that of the facets, not of the "
-        f"shape: add a Subdivision modifier if the mesh stands for a smooth shape. {message}",
-    }
+    if few_facets:
+        message = (
+            "The curves lie on so few facets that the curvature is that of the facets, not of the shape: "
+            f"add a Subdivision modifier if the mesh stands for a smooth shape. {message}"
+        )
+    return {"status": status, "message": message}
 
 
 def suggestion_report(result: core.Reconstruction, reference: Array) -> SuggestedPlane:

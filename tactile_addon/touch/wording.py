@@ -86,6 +86,7 @@ def added_planes(report: TouchReport, unit: Unit) -> str:
 
 
 def _measured_contacts(report: TouchReport) -> str:
+    """How many measured contacts there are on how many curves and strokes, and how many were fitted."""
     numbers = [(report[kind], kind) for kind in ("curves", "strokes") if report[kind]]
     kinds = " and ".join(many(number, kind[:-1], kind) for number, kind in numbers)
     given, fitted = report.get("given_contacts", 0), report["contacts"]
@@ -95,6 +96,7 @@ def _measured_contacts(report: TouchReport) -> str:
 
 
 def _tracked(report: TouchReport) -> str:
+    """How many contacts a touch has on how many curves, and where these end."""
     stops = sorted({stop for pair in report["stops"] for stop in pair})
     where = ", ".join(core.WHERE.get(stop, stop) for stop in stops)
     return f"{report['contacts']} on {len(report['planes'])} curves, which end {where}"
@@ -133,6 +135,7 @@ def curvatures(report: Mapping[str, Any], unit: Unit) -> str:
 
 
 def _verification(report: TouchReport, unit: Unit) -> str:
+    """The distances of the mesh's vertices from the patch in words, if there are any."""
     if "curves" in report:
         return "there is none"
     if not report["vertices"]:
@@ -169,6 +172,7 @@ def registration_summary(found: Registration, unit: Unit | None = None) -> str:
 
 
 def _spread(found: Mapping[str, Any], what: str, unit: Unit) -> str:
+    """Mean, median, largest and root mean square of distances in words."""
     return ", ".join(f"{key} {say(found[f'{what}_{key}'], 1, unit)}" for key in SPREAD)
 
 
@@ -187,6 +191,7 @@ def vector(v: Iterable[float]) -> str:
 
 
 def _measured(report: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
+    """A value of the report, which is in length^power, in words with its standard deviation."""
     return say(report[key], power, unit, report[f"{key}_std"])
 
 

@@ -86,17 +86,14 @@ class TACTILE_OT_drag(bpy.types.Operator):
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         if event.type in {"ESC", "RIGHTMOUSE"}:
             self._set(context, self._before)
-            self._end(context)
+            self.cancel(context)
             return {"CANCELLED"}
         if event.type == "LEFTMOUSE" and event.value == "RELEASE":
-            self._end(context)
+            self.cancel(context)
             return {"FINISHED"}
         if event.type == "MOUSEMOVE":
             self._follow(context, event)
         return {"RUNNING_MODAL"}
-
-    def cancel(self, context: bpy.types.Context) -> None:
-        self._end(context)
 
     def _follow(self, context: bpy.types.Context, event: bpy.types.Event) -> None:
         """Changes the value as the mouse has moved, or puts the point below the mouse."""
@@ -187,7 +184,8 @@ class TACTILE_OT_drag(bpy.types.Operator):
             words = f"{angle} {self.plane + 1}: {math.degrees(self._value):.1f}°"
         context.area.header_text_set(words)
 
-    def _end(self, context: bpy.types.Context) -> None:
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Ends the gesture, and touches again; Blender calls it, too, when it ends the operator itself."""
         context.area.header_text_set(None)
         context.workspace.status_text_set(None)
         found = probe.probe_of(context.object)

@@ -44,16 +44,11 @@ def is_free(context: bpy.types.Context, place: Vector | None, margin: float) -> 
 
 def _uncovered(context: bpy.types.Context) -> tuple[float, float, float, float]:
     """(left, right, bottom, top) of the part of the region between those at its sides."""
-    left, right, bottom, top = 0.0, float(context.region.width), 0.0, float(context.region.height)
-    for x, y, other in _others(context):
-        if other.alignment == "LEFT":
-            left = max(left, x + other.width)
-        elif other.alignment == "RIGHT":
-            right = min(right, x)
-        elif other.alignment == "BOTTOM":
-            bottom = max(bottom, y + other.height)
-        elif other.alignment == "TOP":
-            top = min(top, y)
+    others = list(_others(context))
+    left = max([0.0, *(x + other.width for x, _, other in others if other.alignment == "LEFT")])
+    right = min([float(context.region.width), *(x for x, _, other in others if other.alignment == "RIGHT")])
+    bottom = max([0.0, *(y + other.height for _, y, other in others if other.alignment == "BOTTOM")])
+    top = min([float(context.region.height), *(y for _, y, other in others if other.alignment == "TOP")])
     return left, right, bottom, top
 
 

@@ -22,14 +22,18 @@ def draw_hints(layout: bpy.types.UILayout, hints: Iterable[tuple[Any, str]]) -> 
             layout.label(text=text, icon=icon)
 
 
+def is_over(region: bpy.types.Region, x: float, y: float) -> bool:
+    """Whether a place of the window, in pixels, is in a region."""
+    return 0 <= x - region.x < region.width and 0 <= y - region.y < region.height
+
+
 def viewport_below(
     context: bpy.types.Context, event: bpy.types.Event
 ) -> tuple[Any, bpy.types.Region, Any] | None:
     """(space, region, view) of the 3D viewport below the mouse, or None if it is over anything else."""
-    x, y = event.mouse_x, event.mouse_y
     for area in context.screen.areas:
-        inside = [r for r in area.regions if 0 <= x - r.x < r.width and 0 <= y - r.y < r.height]
-        if area.type == "VIEW_3D" and inside and all(r.type == "WINDOW" for r in inside):
+        inside = [region for region in area.regions if is_over(region, event.mouse_x, event.mouse_y)]
+        if area.type == "VIEW_3D" and inside and all(region.type == "WINDOW" for region in inside):
             return area.spaces.active, inside[0], inside[0].data
     return None
 

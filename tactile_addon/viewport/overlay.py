@@ -15,7 +15,7 @@ from gpu_extras.batch import batch_for_shader
 from ..probes import probe
 from ..scene import colors, patch_record
 from ..scene.attributes import REASON
-from ..scene.contour_mesh import RIM_CORNERS
+from ..scene.contour_mesh import rim
 from ..scene.viewports import shows_colors
 from ..stability_map import map_object
 from ..touch import units
@@ -23,6 +23,7 @@ from ..touch.touch_object import Touched, plane_axes
 from ..touch.types import Array, Object
 from ..touch.units import Unit
 from .free_view import free_strip
+from .mouse import is_over
 
 # Each sampling plane has one of Okabe and Ito's colors, which color-blind readers can tell apart.
 PLANE_COLORS = [
@@ -31,6 +32,7 @@ PLANE_COLORS = [
 ]  # fmt: skip
 WHITE, DARK = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.6)
 FONT = 0  # This is Blender's own font.
+TEXT = 11.0  # The font's size in panels.
 LEGEND_STEPS = 65  # The number of colors of the legend's bar.
 LETTERS, OFFSET = 48, 16  # The letters in a line of words near the mouse, and the pixels between them.
 BAR = (150, 12)  # Width and height of the legend's bar, in pixels at resolution scale 1,
@@ -40,50 +42,51 @@ BESIDE = 195  # and the width that it needs beside the last operator's panel.
 def preview_lines(touched: Touched) -> list[tuple[Array, tuple[float, ...]]]:
     """(points, color) of each line of a pick's preview: the rim of the patch, the normal and the contours."""
     r = touched.result
-    edge = r.domain.boundary(RIM_CORNERS)
-    edge = r.frame.to_world(np.column_stack([edge, r.height(*edge.T)]))
     normal = np.array([r.frame.origin, r.frame.origin + 0.6 * r.radius * r.frame.axes[:, 2]])
     pairs = zip(r.contours, PLANE_COLORS, strict=False)
     curves = [(contour.points, (*color, 1.0)) for contour, color in pairs]
-    return [(np.vstack([edge, edge[:1]]), WHITE), (normal, WHITE), *curves]
+    return [(r.frame.to_world(rim(r)), WHITE), (normal, WHITE), *curves]
 
 
 def draw_key(seen: dict[str, Any]) -> None:
     """Draws what the lines of the preview are, or next to the mouse why there is none."""
     context = bpy.context
-    if not _is_over(context.region, seen["mouse"]):
+    if not is_over(context.region, *seen["mouse"]):
         return
     if seen["touched"] is not None:
-        count = len(seen["touched"].result.contours)
-        names = zip(range(1, count + 1), PLANE_COLORS, strict=False)
-        planes = [(f"Curve in Plane {number}", (*color, 1.0)) for number, color in names]
+        shown = PLANE_COLORS[: len(seen["touched"].result.contours)]
+        planes = [(f"Curve in Plane {number}", (*color, 1.0)) for number, color in enumerate(shown, 1)]
         _draw_box(context, "Preview", 0.0, [], [("Rim and Normal of the Patch", WHITE), *planes])
     elif seen["refusal"] is not None:
         _draw_words(context, textwrap.wrap(seen["refusal"], LETTERS), seen["mouse"])
 
 
-def _is_over(region: bpy.types.Region, mouse: Sequence[float]) -> bool:
-    """Whether a place of the window is in a region."""
-    return 0 <= mouse[0] - region.x < region.width and 0 <= mouse[1] - region.y < region.height
-
-
 def _draw_words(context: bpy.types.Context, lines: Sequence[str], mouse: Sequence[float]) -> None:
     """Draws lines of text in a box next to a place of the window, in the region that has it."""
-    region, scale = context.region, context.preferences.system.ui_scale
+    region, (scale, gap, line, ground) = context.region, _begin_box(context)
     x, y = mouse[0] - region.x, mouse[1] - region.y
-    theme: Any = context.preferences.themes[0].user_interface.wcol_tooltip
-    blf.size(FONT, 11.0 * scale)
-    red, green, blue = theme.text
-    blf.color(FONT, red, green, blue, 1.0)
-    gap, line = 6.0 * scale, blf.dimensions(FONT, "0")[1]
     wide = max(blf.dimensions(FONT, text)[0] for text in lines) + 2.0 * gap
     high = len(lines) * (line + gap) + gap
     left, right, bottom = free_strip(context, high, BESIDE * scale)
     x = max(min(x + OFFSET * scale, right - gap - wide), left)
     y = min(max(y - OFFSET * scale - high, bottom), region.height - high)
-    _fill_box(x, y, wide, high, (*theme.inner[:3], 0.9))
+    _fill_box(x, y, wide, high, (*ground, 0.9))
     for number, text in enumerate(lines):
         _write(text, x + gap, y + high - (number + 1) * (line + gap))
+
+
+def _begin_box(context: bpy.types.Context) -> tuple[float, float, float, Sequence[float]]:
+    """Sets the font of a box of text as tooltips have it.
+
+    Returns the resolution scale, the gap between lines and the height of a line in pixels, and the color of
+    the ground, (red, green, blue).
+    """
+    theme: Any = context.preferences.themes[0].user_interface.wcol_tooltip
+    scale = context.preferences.system.ui_scale
+    blf.size(FONT, TEXT * scale)
+    red, green, blue = theme.text
+    blf.color(FONT, red, green, blue, 1.0)
+    return scale, 6.0 * scale, blf.dimensions(FONT, "0")[1], theme.inner[:3]
 
 
 def draw_preview(seen: dict[str, Any]) -> None:
@@ -115,14 +118,13 @@ def _active(context: bpy.types.Context) -> Object | None:
 def draw_plane() -> None:
     """Draws the part of the active sampling plane that its contour may reach, while a handle is dragged."""
     context = bpy.context
-    if not any(operator.bl_idname == "TACTILE_OT_drag" for operator in context.window.modal_operators):
+    if not _is_running(context, "TACTILE_OT_drag"):
         return
     obj = probe.probe_of(_active(context))
-    if obj is None or not obj.visible_get():
+    record = probe.record_of(obj)
+    if record is None or not obj.visible_get():
         return
-    settings, record = obj.tactile_probe, probe.record_of(obj)
-    if record is None:
-        return
+    settings = obj.tactile_probe
     number = min(settings.active_plane, settings.plane_count - 1)
     t, up, _ = plane_axes(obj.matrix_world, settings, number).T
     origin, size = np.array(obj.matrix_world.translation, dtype=float), record["extent"]
@@ -138,7 +140,9 @@ def draw_plane() -> None:
 def draw_legend() -> None:
     """Draws the legend of the active patch, whole object or map: quantity, unit and range."""
     context = bpy.context
-    if not shows_colors(context.space_data) or _is_picking(context) or not _is_last_view(context):
+    # A pick draws the key of its preview where the legend is.
+    is_picking = _is_running(context, "TACTILE_OT_pick")
+    if is_picking or not shows_colors(context.space_data) or not _is_last_view(context):
         return
     obj = _active(context)
     patch, record = probe.patch_near(obj), probe.record_of(obj)
@@ -150,8 +154,7 @@ def draw_legend() -> None:
         title = patch.bl_rna.properties["tactile_colors"].enum_items[shown].name
         unit = units.unit_of_report(context.scene, record)
         bar = _scale(title, record, unit, patch_record.POWERS[shown], low)
-        unknown = record.get("is_gray")
-        _draw_box(context, *bar, [("Unknown", colors.UNKNOWN)] if unknown else ())
+        _draw_box(context, *bar, [("Unknown", colors.UNKNOWN)] if record.get("is_gray") else ())
     elif obj is not None and patch_record.MAP_RECORD in obj and obj.visible_get():
         record, shown = obj[patch_record.MAP_RECORD], obj.tactile_map_colors
         title = obj.bl_rna.properties["tactile_map_colors"].enum_items[shown].name
@@ -166,9 +169,9 @@ def draw_legend() -> None:
         _draw_box(context, *bar, map_object.swatches(obj))
 
 
-def _is_picking(context: bpy.types.Context) -> bool:
-    """Whether a pick draws the key of its preview where the legend is."""
-    return any(operator.bl_idname == "TACTILE_OT_pick" for operator in context.window.modal_operators)
+def _is_running(context: bpy.types.Context, name: str) -> bool:
+    """Whether the operator of this name waits for events of the window."""
+    return any(operator.bl_idname == name for operator in context.window.modal_operators)
 
 
 def _is_last_view(context: bpy.types.Context) -> bool:
@@ -195,12 +198,7 @@ def _draw_box(
     swatches: Sequence[tuple[str, Sequence[float]]] = (),
 ) -> None:
     """Draws a title, a bar of colors from `low` to 1 if there are labels, and swatches, if there is room."""
-    theme: Any = context.preferences.themes[0].user_interface.wcol_tooltip
-    scale = context.preferences.system.ui_scale
-    blf.size(FONT, 11.0 * scale)
-    red, green, blue = theme.text
-    blf.color(FONT, red, green, blue, 1.0)
-    gap, line = 6.0 * scale, blf.dimensions(FONT, "0")[1]
+    scale, gap, line, ground = _begin_box(context)
     bar = BAR[1] * scale + line + 2.0 * gap if labels else 0.0
     high = line + 2.0 * gap + bar + len(swatches) * (line + gap)
     left, right, bottom = free_strip(context, high + gap, BESIDE * scale)
@@ -210,7 +208,7 @@ def _draw_box(
     if wide < 0.5 * BAR[0] * scale or bottom + high > context.region.height:
         return
     x, y = right - gap - wide, bottom + gap
-    _fill_box(x, y, wide, high, (*theme.inner[:3], 0.8))
+    _fill_box(x, y, wide, high, (*ground, 0.8))
     x, wide = x + 2.0 * gap, wide - 4.0 * gap
     for number, (text, color) in enumerate(reversed(swatches)):
         at = y + gap + number * (line + gap)
@@ -219,7 +217,7 @@ def _draw_box(
     y += high - gap - line
     if labels:
         _draw_bar(x, y - gap - BAR[1] * scale, wide, BAR[1] * scale, gap, low, labels)
-    blf.size(FONT, 11.0 * scale * min(1.0, wide / lengths[0]))
+    blf.size(FONT, TEXT * scale * min(1.0, wide / lengths[0]))
     _write(title, x, y)
 
 

@@ -12,6 +12,7 @@ from ..probes.operators import (
     has_mesh,
     is_in_object_mode,
     make_active,
+    report_done,
     report_error,
     target_object,
 )
@@ -20,13 +21,11 @@ from ..scene.viewports import show_colors, show_size
 from ..stability_map.map_object import inputs_of, touched_near
 from ..touch import units
 from ..touch.settings import (
-    LOCATION,
     NAMES,
-    OUTWARD,
-    TARGET,
     UNSAVED,
-    TouchSettings,
+    PlacedTouch,
     draw_all,
+    given,
     touch_arguments,
 )
 from ..touch.touch_object import Touched, touch
@@ -45,16 +44,13 @@ HINTS = (
 )
 
 
-class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
+class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
     """Click on a mesh: a probe there feels the surface and keeps a patch of it up to date"""
 
     bl_idname = "tactile.pick"
     bl_label = "Pick Reference Point"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
-    target: TARGET
-    location: LOCATION
-    outward: OUTWARD
     new: BoolProperty(
         name="New Probe",
         description="Make a new probe instead of moving the active one",
@@ -77,8 +73,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         if context.area is None or context.area.type != "VIEW_3D":
-            self.report({"ERROR"}, "Points are picked in a 3D viewport: start the pick there")
-            return {"CANCELLED"}
+            return report_error(self, ValueError("Points are picked in a 3D viewport: start the pick there"))
         active = context.view_layer.objects.active
         if active is not None and active.type == "MESH":
             show_size(max(active.dimensions[:]))
@@ -166,16 +161,14 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         show_size(touched.surface.size)
         report = probe.record_of(found)
         unit = units.unit_of(context.scene, report["radius"])
-        self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, verdict(report, unit))
-        return {"FINISHED"}
+        return report_done(self, verdict(report, unit), report["status"] == "ok")
 
     def _touch(self, context: bpy.types.Context, target: Object, depsgraph: bpy.types.Depsgraph) -> Touched:
-        given = self.properties.is_property_set
         return touch(
             target,
             depsgraph,
-            list(self.location) if given("location") else context.scene.cursor.location.to_tuple(),
-            toward=list(self.outward) if given("outward") else None,
+            given(self, "location") or context.scene.cursor.location.to_tuple(),
+            toward=given(self, "outward"),
             **touch_arguments(self),
         )
 
@@ -193,13 +186,13 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         Raises ValueError if the probe cannot be changed.
         """
         active: Object = context.view_layer.objects.active
-        moved, given = None if self.new else probe.probe_of(active), {}
+        moved, inputs = None if self.new else probe.probe_of(active), {}
         if moved is not None:
             probe.require_unlocked(moved)
-            given = {name: getattr(moved.tactile_probe, name) for name in NAMES}
+            inputs = {name: getattr(moved.tactile_probe, name) for name in NAMES}
         elif active is not None and patch_record.MAP_RECORD in active:
-            given = inputs_of(active)
-        for name, value in given.items():
+            inputs = inputs_of(active)
+        for name, value in inputs.items():
             if not self.properties.is_property_set(name):
                 setattr(self, name, value)
         return moved
@@ -225,8 +218,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
                 unit = units.unit_of(context.scene, touched.result.radius)
                 is_sure = touched.report["status"] == "ok"
                 bends = f"principal curvatures {curvatures(touched.report, unit)}"
-                result = bends if is_sure else verdict(touched.report, unit)
-                words = short = f"{touched.report['source']}: {result}"
+                words = short = f"{obj.name}: {bends if is_sure else verdict(touched.report, unit)}"
         except ValueError as error:
             words = self._seen["refusal"] = sentence(error)
             short = "No touch is possible here"

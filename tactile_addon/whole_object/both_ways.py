@@ -11,6 +11,7 @@ from mathutils.bvhtree import BVHTree
 
 from ... import core
 from ...core.steps import part_of
+from ...core.triangles import normalized, triangle_cross
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Array
 
@@ -46,13 +47,11 @@ class BothWays:
         normals = self._mesh.normals
         yield 0.0
         yield from part_of(self._off_target(corners, normals, self.deviation), 0.0, 0.3)
-        a, b, c = corners[triangles].transpose(1, 0, 2)
-        normals = np.cross(b - a, c - a)
-        areas = np.linalg.norm(normals, axis=1)
-        normals /= np.maximum(areas, 1e-300)[:, None]
-        middles, off = (a + b + c) / 3.0, np.zeros(len(areas))
+        across = triangle_cross(corners[triangles])
+        areas, middles = np.linalg.norm(across, axis=1), corners[triangles].mean(axis=1)
+        off = np.zeros(len(areas))
         yield 0.3
-        yield from part_of(self._off_target(middles, normals, off), 0.3, 0.7)
+        yield from part_of(self._off_target(middles, normalized(across), off), 0.3, 0.7)
         there, places = np.abs(off), self._places()
         yield 0.7
         trees = yield from self._trees()

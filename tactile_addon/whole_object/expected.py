@@ -10,6 +10,7 @@ import numpy as np
 
 from ... import core
 from ...core.arguments import many
+from ...core.triangles import triangle_cross
 from ..touch import units
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Object
@@ -52,8 +53,7 @@ class Expected:
 def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, float]:
     """About how many touches a DetachedMesh takes, and seconds. Raises ValueError if none is possible."""
     begin = perf_counter()
-    a, b, c = mesh.points[mesh.triangles].transpose(1, 0, 2)
-    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    area = 0.5 * float(np.linalg.norm(triangle_cross(mesh.points[mesh.triangles]), axis=1).sum())
     points, normals = core.scattered(mesh.points, mesh.triangles, TRIED, np.random.default_rng(SEED))
     touches = core.expected_touches(mesh, points, normals, area, tolerance=tolerance, noise=noise, rng=SEED)
     each = (perf_counter() - begin) / TRIED

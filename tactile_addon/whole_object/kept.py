@@ -5,9 +5,8 @@
 from ..touch.types import Object
 from .object_touches import ObjectTouches
 
-_kept: dict[
-    int, ObjectTouches
-] = {}  # ObjectTouches by the session_uid of the object that they made; one at most.
+# ObjectTouches by the session_uid of the object that they made; one at most.
+_kept: dict[int, ObjectTouches] = {}
 
 
 def keep(obj: Object, touches: ObjectTouches) -> None:

@@ -8,24 +8,28 @@ import bpy
 from bpy.props import EnumProperty, FloatVectorProperty, IntProperty
 
 from ..probes import probe
-from ..probes.in_slices import InSlices, Progress
+from ..probes.in_slices import AllOver, Progress
 from ..probes.number_fields import dragged
 from ..probes.operators import (
-    fields_of,
     has_target,
     is_in_object_mode,
     make_active,
+    report_done,
     target_object,
 )
 from ..scene import patch_record
-from ..touch.settings import NOISE, TARGET, UNSAVED, draw_chosen, length_property
+from ..touch.settings import NOISE, UNSAVED, draw_chosen, given, length_property
 from ..touch.types import Outcome
-from ..touch.wording import sentence
 from . import kept, whole_mesh
 from .expected import Expected
 from .object_report import object_summary
 from .object_touches import ObjectTouches
 
+EDGE = length_property(
+    "Edge Length",
+    "Length of the edges of the surface's triangles, at most about a quarter of the thinnest wall; 0 "
+    "chooses it by the curvature",
+)
 ACCURACIES = [
     ("quick", "Quick", "A tolerance of 1/200 of the object's size: few touches, details are lost"),
     ("normal", "Normal", "A tolerance of 1/500 of the object's size"),
@@ -34,14 +38,13 @@ ACCURACIES = [
 
 
 @dragged
-class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
+class TACTILE_OT_touch_all_over(AllOver, bpy.types.Operator):
     """Touch an object all over, from one point on, and join the patches to one surface"""
 
     bl_idname = "tactile.touch_all_over"
     bl_label = "Touch All Over"
     bl_options = {"UNDO", "PRESET"}
 
-    target: TARGET
     location: FloatVectorProperty(
         name="Location",
         subtype="TRANSLATION",
@@ -69,22 +72,14 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         min=1,
         soft_max=10_000,
     )
-    edge: length_property(
-        "Edge Length",
-        "Length of the edges of the surface's triangles, at most about a quarter of the thinnest wall; 0 "
-        "chooses it by the curvature",
-    )
+    edge: EDGE
 
     stop = "Stop Touching and Keep"
-    meanwhile = {"PASS_THROUGH"}  # The scene may change, because a detached mesh is touched.
     _growing = _expected = None
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return is_in_object_mode(cls, context, "Objects are touched") and has_target(cls, context)
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
-        return self._ask(context)
 
     def _go_on(self, context: bpy.types.Context) -> Outcome:
         self._growing = whole_mesh.GrowingPatches(context.scene, self._touches.surface)
@@ -92,7 +87,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
 
     def _begin(self, context: bpy.types.Context) -> None:
         target, found = target_object(context, self.target), probe.probe_of(context.view_layer.objects.active)
-        location = list(self.location) if self.properties.is_property_set("location") else None
+        location = given(self, "location")
         if location is None and found is not None and found.tactile_probe.target == target:
             location = list(found.matrix_world.translation)
         self._touches = ObjectTouches(
@@ -144,25 +139,17 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         kept.keep(made, self._touches)
         make_active(context, made)
         record = made[patch_record.ATLAS_RECORD].to_dict()
-        self.report({"INFO"} if record["status"] == "ok" else {"WARNING"}, object_summary(record))
-        return {"FINISHED"}
+        return report_done(self, object_summary(record), record["status"] == "ok")
 
     def _about(self, context: bpy.types.Context) -> str:
-        """What it will take, in a sentence, or why the object cannot be touched."""
+        """What it will take, in a sentence."""
         if self._expected is None:
             self._expected = Expected()
-        try:
-            target = target_object(context, self.target)
-            return self._expected.words(target, context, self.tolerance, self.accuracy, self.noise)
-        except ValueError as error:
-            return sentence(error)
+        target = target_object(context, self.target)
+        return self._expected.words(target, context, self.tolerance, self.accuracy, self.noise)
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split, layout.use_property_decorate = True, False
-        layout.prop_search(self, "target", context.scene, "objects")
-        layout.label(text=self._about(context), translate=False)
-        fields = fields_of(context, self.target)
+        layout, fields = self.layout, self._draw_target(context)
         row = layout.row()
         row.active = not self.tolerance
         row.prop(self, "accuracy", expand=True)

@@ -98,13 +98,13 @@ def facets(record: Mapping[str, Any]) -> str | None:
 
 def object_summary(record: Mapping[str, Any]) -> str:
     """A sentence on what was found of a whole object."""
-    std = units.say(record["height_std"], 1, unit_of(record))
     if "touches" in record:
         touches, off = many(record["touches"], "touch", "touches"), deviation(record, "mean")
         off = "" if record["uncovered"] else f"; {off} off the mesh on average"
         return f"{verdict_of(record)}: {touches}; {_surface(record)}{off}"
     patches = f"{many(record['patches'], 'patch', 'patches')} of {_contacts(record)}"
-    return f"{verdict_of(record)}: {patches}; {_surface(record)}; ± {std}"
+    height = units.say(record["height_std"], 1, unit_of(record))
+    return f"{verdict_of(record)}: {patches}; {_surface(record)}; ± {height}"
 
 
 def object_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -80,7 +80,7 @@ class ObjectTouches:
         self._start = None
         if location is not None:
             at = np.subtract(location, self.surface.origin)
-            self._start = nearest_point(obj.name, self.surface, at, AWAY * self.surface.size)
+            self._start = nearest_point(self.surface, at, AWAY * self.surface.size)
 
     def _require_lengths(self, noise: float, edge: float) -> None:
         """Raises ValueError, with a sentence, for lengths that are too large or too small for this object."""
@@ -169,8 +169,7 @@ class ObjectTouches:
             self._faceted += r.domain.area * core.has_few_facets(
                 r, self.surface.face_near, self.surface.corners_of
             )
-            covered = core.covered_by(r, rim, self._left, self.tolerance)
-            self._left = self._left[~covered]
+            self._left = self._left[~core.covered_by(r, rim, self._left, self.tolerance)]
         self.done, self.uncovered = state.done, state.uncovered
         touches, places = many(state.done, "touch", "touches"), many(state.uncovered, "place", "places")
         patches = many(len(self.found), "patch", "patches")

@@ -10,24 +10,19 @@ from mathutils import Vector
 
 from ..probes.in_slices import InSlices, Progress
 from ..probes.number_fields import dragged, fields
-from ..probes.operators import is_in_object_mode, make_active, polls, report_error
+from ..probes.operators import is_in_object_mode, make_active, polls, report_done, report_error, surface_of
 from ..scene import patch_record
 from ..scene.attributes import DEVIATION
 from ..scene.mesh_data import own_mesh, values
 from ..touch.arrays import read_array
-from ..touch.settings import draw_chosen, length_property
+from ..touch.settings import draw_chosen
 from ..touch.types import Object, Outcome, Point
 from . import kept, whole_mesh
+from .object_operator import EDGE
 from .object_report import deviation, object_summary
 
 SEEN = 0.4  # The view is as wide as this share of the object's size.
 REACHED = 0.5  # Where less than this share of the largest deviation is the surface's, it is the object's.
-
-
-def surface_of(context: bpy.types.Context) -> Object | None:
-    """The active object if it is a whole object, or None."""
-    obj: Object = context.view_layer.objects.active
-    return obj if obj is not None and patch_record.ATLAS_RECORD in obj else None
 
 
 class TACTILE_OT_look_farthest(bpy.types.Operator):
@@ -73,8 +68,8 @@ class TACTILE_OT_look_farthest(bpy.types.Operator):
 
 def _select_nearest(mesh: bpy.types.Mesh, place: Point) -> Any:
     """Selects the vertex nearest to a place, and nothing else, and returns it."""
-    points = read_array(mesh.vertices, "co", 3)
-    nearest = int(np.argmin(((points - np.array(place)) ** 2).sum(axis=1)))
+    offsets = read_array(mesh.vertices, "co", 3) - np.array(place)
+    nearest = int(np.argmin((offsets**2).sum(axis=1)))
     for parts in (mesh.vertices, mesh.edges, mesh.polygons):
         parts.foreach_set("select", np.zeros(len(parts), dtype=bool))
     mesh.vertices[nearest].select = True
@@ -90,28 +85,19 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
     bl_label = "Change Edge Length"
     bl_options = {"UNDO"}
 
-    edge: length_property(
-        "Edge Length",
-        "Length of the edges of the surface's triangles, at most about a quarter of the thinnest wall; 0 "
-        "chooses it by the curvature",
-    )
+    edge: EDGE
 
     stop = "Keep It as It Was"
     stopped = "Stopped: the surface stays as it was"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        touches, hint = (
-            kept.touches_of(surface_of(context)),
-            "Only the last surface that was touched has its touches in memory",
-        )
-        return polls(cls, touches, hint) and is_in_object_mode(cls, context, "Surfaces are made")
+        hint = "Only the last surface that was touched has its touches in memory"
+        has_touches = polls(cls, kept.touches_of(surface_of(context)), hint)
+        return has_touches and is_in_object_mode(cls, context, "Surfaces are made")
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
-        if bpy.app.background:
-            return self.execute(context)
-        self._in_window = True
-        return context.window_manager.invoke_props_dialog(self, confirm_text="Mesh Again")
+        return self._confirm(context, "Mesh Again")
 
     def _begin(self, context: bpy.types.Context) -> None:
         obj = surface_of(context)
@@ -138,17 +124,17 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
 
     def _finish(self, context: bpy.types.Context) -> Outcome:
         obj = self._object(context)
-        source = obj[patch_record.ATLAS_RECORD]["source"]
-        whole_mesh.rewrite(obj, self._touches.whole, self._touches.report() | {"source": source})
+        report = self._touches.report() | {"source": obj[patch_record.ATLAS_RECORD]["source"]}
+        whole_mesh.rewrite(obj, self._touches.whole, report)
         kept.keep(obj, self._touches)
-        self.report({"INFO"}, object_summary(obj[patch_record.ATLAS_RECORD].to_dict()))
-        return {"FINISHED"}
+        return report_done(self, object_summary(obj[patch_record.ATLAS_RECORD].to_dict()))
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
-        size = surface_of(context)[patch_record.ATLAS_RECORD]["size"]
-        draw_chosen(layout, self, "edge", fields=fields(size))
+        draw_chosen(
+            layout, self, "edge", fields=fields(surface_of(context)[patch_record.ATLAS_RECORD]["size"])
+        )
 
 
 CLASSES = (TACTILE_OT_look_farthest, TACTILE_OT_mesh_again)
