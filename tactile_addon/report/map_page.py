@@ -60,7 +60,7 @@ def _errors(mesh: bpy.types.Mesh, record: Mapping[str, Any], unit: Unit) -> list
     weights, std = np.ones(known.sum()), float(np.median(values(mesh, HEIGHT_STD)[known]))
     size = (record["extent"], "extent") if record["extent"] else (record["reach_median"], "median reach")
     words = (
-        "Shares of the face corners by the error of the touch whose values they have. The last bar counts "
+        "Shares of the vertices by the error of the touch whose values they have. The last bar counts "
         "all larger errors."
     )
     return [

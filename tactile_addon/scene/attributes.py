@@ -19,12 +19,12 @@ NORMAL, PLACE = "custom_normal", "domain_place"  # Normals for shading; places o
 NODE = "patch"  # The node of a whole object's graph whose patch counts most.
 CONTOUR, CONTACT = "contour", "contact"  # Numbers of contours, and of contacts along them, -1 for none.
 MEASURES = ("error", HEIGHT_STD, "reach", "condition_number", "blind_share")  # Of a stability map,
-REASON, MAP_COLOR = "reason", "stability_color"  # and so are these.
+REASON, TOUCH, MAP_COLOR = "reason", "touch", "stability_color"  # and so are these.
 TYPES: dict[str, Any] = {
     **dict.fromkeys((*CURVATURES, GAUSSIAN_STD, CURVATURE_STD, DEVIATION, HEIGHT_STD, *MEASURES), "FLOAT"),
     **dict.fromkeys((POSITION, NORMAL, PLACE), "FLOAT_VECTOR"),
     **dict.fromkeys((COLOR, MAP_COLOR), "FLOAT_COLOR"),
-    **dict.fromkeys((NODE, CONTOUR, CONTACT, REASON), "INT"),
+    **dict.fromkeys((NODE, CONTOUR, CONTACT, REASON, TOUCH), "INT"),
 }
 # The property of an attribute's data that has its values, by the attribute's type.
 KEYS = {

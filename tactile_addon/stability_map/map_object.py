@@ -10,7 +10,7 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ..scene import colors, patch_object, patch_record
-from ..scene.attributes import CORNERS, HEIGHT_STD, MAP_COLOR, MEASURES, REASON
+from ..scene.attributes import CORNERS, HEIGHT_STD, MAP_COLOR, MEASURES, REASON, TOUCH
 from ..scene.mesh_data import emission, write
 from ..scene.shown import LEAST_RANGE
 from ..scene.viewports import show_colors
@@ -20,7 +20,8 @@ from ..touch.types import Array, Object
 from .stability import NOTHING, REASON_KEYS, REASONS, StabilityMap
 
 SHADES = 256
-PLACES = "tactile_places"  # The points that were touched, in the axes of the map: three numbers each.
+PLACES = "tactile_places"  # The points that were touched, in the axes of the map: three numbers each,
+VALUES = "tactile_values"  # and what was found there, by the names of the attributes.
 # The map is shown this share of the object's size above the mesh. With less it flickers if it is 20000 clip
 # starts away, as a scan in mm is.
 SHOWN_ABOVE = 5e-3
@@ -73,6 +74,8 @@ def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Ob
     painted[PLACES] = _applied(np.linalg.inv(_array(painted.matrix_basis)), places).ravel().tolist()
     mesh.materials.clear()
     mesh.materials.append(emission("Tactile Stability", attribute=MAP_COLOR))
+    painted[VALUES] = {name: touched.measures[name].tolist() for name in MEASURES}
+    painted[VALUES][REASON] = touched.reason.tolist()
     painted[patch_record.MAP_RECORD] = touched.report() | {"source": obj.name, "painted": painted.name}
     patch_object.collection(context.scene).objects.link(painted)
     recolor(painted)
@@ -81,16 +84,17 @@ def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Ob
 
 
 def _paint(mesh: bpy.types.Mesh, touched: StabilityMap) -> None:
-    """Gives each corner of a face the values of the touch in the face, or else of the one nearest to it.
+    """Gives each vertex the values of its touch, and each corner of a face the touch whose color it has.
 
-    Narrow faces may share all their vertices with wide ones, as on a plate, and have other values.
+    That is the touch in the face, if there is one: narrow faces may share all vertices with wide ones.
     """
+    for name in MEASURES:
+        write(mesh, name, touched.measures[name][touched.touch_of])
+    write(mesh, REASON, touched.reason[touched.touch_of])
     corners = read_array(mesh.loops, "vertex_index", dtype=np.int32)
     within = np.repeat(touched.touch_in, read_array(mesh.polygons, "loop_total", dtype=np.int32))
     touch = np.where(within < 0, touched.touch_of[corners], within)
-    for name in MEASURES:
-        write(mesh, name, touched.measures[name][touch], CORNERS)
-    write(mesh, REASON, touched.reason[touch], CORNERS)
+    write(mesh, TOUCH, touch.astype(np.int32), CORNERS)
     write(mesh, MAP_COLOR, np.ones((len(touch), 4)), CORNERS)
     mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = MAP_COLOR
 
@@ -98,11 +102,11 @@ def _paint(mesh: bpy.types.Mesh, touched: StabilityMap) -> None:
 def recolor(painted: Object) -> None:
     """Colors the map by the quantity that it is set to show, and keeps the range in its record."""
     shown, mesh, record = painted.tactile_map_colors, painted.data, painted[patch_record.MAP_RECORD]
-    values = read_array(
-        mesh.attributes[shown].data, "value", dtype=np.int32 if shown == REASON else np.float32
-    )
+    values = np.array(painted[VALUES][shown])[
+        read_array(mesh.attributes[TOUCH].data, "value", dtype=np.int32)
+    ]
     if shown == REASON:
-        rgba, limit = colors.linear(REASON_COLORS)[values], len(REASON_KEYS) - 1.0
+        rgba, limit = colors.linear(REASON_COLORS)[values.astype(np.intp)], len(REASON_KEYS) - 1.0
     else:
         limit = _limit(shown, values[values != NOTHING], record["spacing"])
         table = colors.diverging(np.arange(SHADES), SHADES - 1)

@@ -67,7 +67,8 @@ class StabilityMap:
     places : n arrays (3,), the places to touch as the surface has them, in random order
     done : how many of these have been touched; few_facets : how many patches follow facets
     measures, reason : (n,), what was found by each touch; the fields of `measures` are MEASURES
-    touch_of : index of the touch nearest to each vertex of the mesh, once the steps are done
+    touch_of : index of the touch whose values each vertex of the mesh has, once the steps are done: that of
+        the largest touched face at it, or else the nearest
     touch_in : index of the touch in each face, or -1
     """
 
@@ -112,7 +113,7 @@ class StabilityMap:
 
     def steps(self) -> Iterator[None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
-        middles = _middles(self.surface)
+        middles, self._areas = _faces(self.surface)
         yield
         for index in core.spaced(middles, self.spacing, self._rng):
             if index is not None:
@@ -141,8 +142,12 @@ class StabilityMap:
             some = slice(start, start + NEAREST_AT_ONCE)
             self.touch_of[some] = tree.query(points[some])[1]
             yield
-        self.touch_in = np.full(self.surface.owners.max() + 1, -1)
-        self.touch_in[self._touched[: self.done]] = np.arange(self.done)
+        # Touches in narrow faces would color wide ones that share all vertices with them, as on a plate.
+        touch = self.touch_in = np.full(len(self._areas), -1)
+        touch[self._touched[: self.done]] = np.arange(self.done)
+        order = np.argsort(self._areas[self.surface.owners], kind="stable")
+        order = order[touch[self.surface.owners[order]] >= 0]
+        self.touch_of[self.surface.triangles[order].ravel()] = np.repeat(touch[self.surface.owners[order]], 3)
 
     def _touch(self, numbers: Sequence[int]) -> Iterator[None]:
         """Makes the touches with these numbers, as a generator like `steps`."""
@@ -227,8 +232,8 @@ def _reason_of(stops: Iterable[str]) -> int:
     return STOP_CODES[counts.most_common(1)[0][0] if counts else core.CREASE]
 
 
-def _middles(surface: DetachedMesh) -> Array:
-    """The middle of the largest triangle of each face, (m, 3).
+def _faces(surface: DetachedMesh) -> tuple[Array, Array]:
+    """The middle of the largest triangle of each face, (m, 3), and the areas of faces, (m,).
 
     The middle is within a face even if that is concave. Of equal triangles, as in a quad, it is the first.
     """
@@ -237,8 +242,7 @@ def _middles(surface: DetachedMesh) -> Array:
     most = np.maximum.reduceat(areas, np.flatnonzero(np.diff(owners, prepend=-1)))
     large = np.flatnonzero(areas >= (1.0 - EQUAL) * most[owners])
     first = large[np.diff(owners[large], prepend=-1) != 0]
-    middles: Array = corners[first].mean(axis=1)
-    return middles
+    return corners[first].mean(axis=1), np.bincount(owners, areas)
 
 
 class _Plane:
