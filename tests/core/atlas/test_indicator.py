@@ -112,6 +112,7 @@ def test_areas_of_overlapping_patches_add_up_to_that_of_the_surface(charts):
     assert np.bincount(octant, samples.areas) == pytest.approx(0.5 * np.pi, rel=0.1)
 
 
+@pytest.mark.long
 def test_a_cell_is_five_tolerances_but_neither_coarse_nor_finer_than_the_memory_allows(charts):
     cells = [result_of(indicated(charts, tolerance)).cell for tolerance in (4e-3, 1.0, None)]
     assert cells == pytest.approx([0.02, 2.0 / 80.0, 2.0 / 80.0], rel=0.02)

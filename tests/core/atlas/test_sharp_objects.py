@@ -209,6 +209,7 @@ def test_a_block_is_right_and_ok_from_any_start():
         assert np.abs(BLOCK.distances(atlas.reference.mesh.vertices)).max() < 1.5 * TOLERANCE
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("point", [(1.0, 0.0, 0.5), (1.0, 0.7, 0.5), (1.0 - 1e-4, 0.7 - 1e-4, 0.5)])
 def test_a_start_on_an_edge_or_in_a_corner_finds_a_good_place_beside_it(point):
     outward = np.array([1.0, 1.0, 1.0]) / np.sqrt(3.0)

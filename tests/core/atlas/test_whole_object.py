@@ -405,6 +405,7 @@ def test_false_while_patches_are_joined_ends_the_touching(when):
         assert len(end.value.patches) <= state.done
 
 
+@pytest.mark.long
 def test_false_while_a_check_is_followed_up_ends_the_touching_soon():
     """The check finds many other balls at once."""
 

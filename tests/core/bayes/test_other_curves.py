@@ -83,6 +83,7 @@ def test_strokes_tell_it_among_three_curves():
     assert fitted(surface, curves, 0.05).curve_contradiction == (0.0, 0.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", AZIMUTHS)
 @pytest.mark.parametrize("noise", [0.0, 0.05, 0.2])
 def test_right_curves_are_not_doubted(count, noise):

@@ -45,6 +45,7 @@ def judged(surface, curves, noise):
     return off.mean(), (off < 1.645 * r.height_std(*points.T)).mean(), off.mean() / r.mean_height_std
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", [100, 1000, 20_000])
 @pytest.mark.parametrize("share", [0.0, 0.002, 0.02])
 def test_many_contacts_are_no_worse_than_few_and_no_surer_than_they_may_be(count, share):

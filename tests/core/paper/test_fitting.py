@@ -119,6 +119,7 @@ def test_both_solvers_reach_the_same_surface(name, noise):
     assert np.abs(fast.patch.height(x, y) - descent.patch.height(x, y)).max() < 0.05
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 @pytest.mark.parametrize("name", ["sphere", "ellipsoid", "torus"])
 def test_the_fast_solver_finds_no_higher_minimum_on_convex_surfaces(name, noise):

@@ -38,6 +38,7 @@ def beyond(r, count=10_000):
     return np.mean(r.frame.to_world(np.column_stack([points, np.zeros(len(points))]))[:, 0] > 1.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("flank", [True, False], ids=["crease", "border"])
 @pytest.mark.parametrize("distance", [0.003, 0.03, 0.2, 0.5, 0.8])
 @pytest.mark.parametrize("count", [3, 4, 6])

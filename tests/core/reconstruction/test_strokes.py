@@ -82,6 +82,7 @@ def test_the_error_falls_as_the_square_of_the_extent_to_what_no_polynomial_tells
     assert errors[1] < max(errors[0] / 4.0**2, 1e-4 * 4.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rows", [0, 9])
 @pytest.mark.parametrize(("count", "share"), [(150, 0.002), (150, 0.02), (3000, 0.002), (3000, 0.02)])
 def test_intervals_of_strokes_hold_and_rows_do_not_bias(count, rows, share):
