@@ -27,7 +27,7 @@ REACH, STEP = 6.0, 0.5  # A border is looked for within this many edges of the m
 HALVINGS = 8  # and then by this many halvings.
 TURNED = 0.87  # A border has a corner where the cosine between its directions on both sides is less,
 STRAIGHT = 0.1  # if it is straight on both sides to this share of an edge.
-INWARD = 0.1  # Corners are felt this share of the way from there to the chord across them.
+INWARD = 0.1  # Corners are felt this share of the way from there to the middle of the chord across them.
 SMOOTHINGS = 3  # This often directions of a border become the means of their neighbors'.
 EARS = 2  # This often triangles with two sides on the border are left out.
 ALONG = 0.5  # Ways agree if the cosine of the angle between them is more.
@@ -41,7 +41,10 @@ Offsets = Callable[[Array, Indices], Generator[float, None, Array]]
 
 
 class Border(NamedTuple):
-    """Where a surface ends: segments (k, 2, 3), ways beyond these (k, 3), and the corners (n, 3) of it."""
+    """Where a surface ends: segments (k, 2, 3), directions out of it there (k, 3), corners (n, 3).
+
+    The directions, called ways, lie in the surface, across its border, and are of any length.
+    """
 
     segments: Array
     ways: Array
@@ -51,7 +54,7 @@ class Border(NamedTuple):
 def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, None, Border]:
     """The border of the surface next to that of a mesh; yields 0 between its steps.
 
-    near : the finger feels the surface where that is within this length of the mesh
+    near : the finger feels the surface at a place if it is within this length of that, along the normal
     """
     if mesh.is_closed:
         return Border(np.zeros((0, 2, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
@@ -65,14 +68,15 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
     places += np.nan_to_num((yield from off(places, np.arange(len(at)))))[:, None] * normals
     ahead = partial(finger.ahead, radius=2.0 * STEP * mesh.edge, s=STEP * mesh.edge)
     beyond = yield from _contacts(ahead, places, normals, ways)
-    ended &= [contact is None for contact in beyond]  # Elsewhere the surface bends away.
+    ended &= [contact is None for contact in beyond]  # With a contact ahead the surface only bends away.
     before, after = (side[ended[before] & ended[after]] for side in (before, after))
     corners, sharp = _corners(places, before, after, mesh.edge)
     a, b = places[before], places[after]
-    chords = 0.5 * (a + b)
-    above = yield from off(corners + INWARD * (chords - corners), before)
-    above_chord = yield from off(chords, before)
-    sharp &= np.isnan(above) == np.isnan(above_chord)
+    middles = 0.5 * (a + b)
+    above = yield from off(corners + INWARD * (middles - corners), before)
+    above_middle = yield from off(middles, before)
+    # At a corner that juts out the finger feels the surface at both places, at one that goes in, at neither.
+    sharp &= np.isnan(above) == np.isnan(above_middle)
     corners += np.nan_to_num(above)[:, None] * normals[before]
     yield 0.0
     c, one, two = corners[sharp], ways[before], ways[after]

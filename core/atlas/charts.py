@@ -202,7 +202,7 @@ class Charts:
         return self.radii * means
 
     def inside(self, share: float) -> NDArray[np.bool_]:
-        """Which knots are within this share of the domains' radii, (n, SIDE, SIDE)."""
+        """Which knots are in the domain scaled by this share about its origin, (n, SIDE, SIDE)."""
         x, y = self.knots().reshape(2, -1)
         patch = np.repeat(np.arange(len(self.radii)), SIDE**2)
         (shares,) = result_of(chunked(lambda *some: (self.shares(*some),), CHUNK, 1.0, x, y, patch))

@@ -90,15 +90,17 @@ def planes_of(points: Array, noise: float) -> Planes:
 
 
 def sharpened(points: Array, normals: Array, planes: Planes) -> Array:
-    """Outward normals (n, 3) of the planes of contacts or, where these bend around an edge, of a neighbor's.
+    """Outward normals (n, 3) of the planes of contacts or, near an edge, of a neighbor's plane.
 
-    Near an edge the neighbors of a contact are on two walls. Those of a contact farther from it lie in a
-    plane that passes through both.
+    Near an edge the neighbors of a contact are on two walls, and their plane is on neither. A contact farther
+    from the edge has all its neighbors on one wall, in a plane that passes through the former contact, too.
+
+    normals : (n, 3), outward: measured ones, or those of the contacts' own planes
     """
     links, rms = planes.links, planes.rms
     off = np.abs(row_dot(normals[links], points[:, None] - points[links]))
-    is_none = (rms[links] > FLATTER * rms[:, None]) | (off > THROUGH * rms[links])
-    off = np.where(is_none, np.inf, np.hypot(off, rms[links]))
+    is_unfit = (rms[links] > FLATTER * rms[:, None]) | (off > THROUGH * rms[links])
+    off = np.where(is_unfit, np.inf, np.hypot(off, rms[links]))
     best = np.argmin(off, axis=1)
     every = np.arange(len(points))
     other = normals[links[every, best]]

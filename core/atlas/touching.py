@@ -40,7 +40,7 @@ SIDE_BY_SIDE = 8  # This many touches at once are faster, and still done in a te
 NEAR = 3.0  # A patch ends where the surface is off it by more tolerances.
 AGAIN = 3  # Where something is missing or less certain, touches go on at most this often.
 CHECKS, CHECK_SEED = 256, 0  # This many rays from outside check the surface.
-HAIR = 0.01  # It is cast again this share of the tolerance aside.
+HAIR = 0.01  # A ray that meets nothing is cast again this share of the tolerance aside.
 SHARPEST, SPIKES = 64, 16  # This many go to its sharpest vertices, and to the triangles around the sharpest.
 STRAIGHT = 0.5  # A ray must meet what it is aimed at if the cosine between it and the normal is more.
 JOINED = 0.5  # Joining is this share of the way to a surface that is checked.
@@ -304,9 +304,10 @@ class _Run:
 def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], float]:
     """Rays that check a mesh from outside all round: their starts, and places that they go to, (k, 3).
 
-    Also whether each of the first must meet something there, (CHECKS / 2,), and the length of all, which ends
-    beyond the mesh. The first CHECKS are random: one half goes to places of the surface, the other to any
-    place near it. Others go to the sharpest vertices, and straight down to triangles around some of these.
+    Also whether each of the first CHECKS / 2 must meet something there, (CHECKS / 2,), see STRAIGHT, and the
+    length of all, which ends beyond the mesh. The first CHECKS are random: one half goes to middles of
+    triangles, the other to any place near the mesh. Others go to the SHARPEST vertices, whose triangles have
+    the least sum of angles there, and straight down to triangles around SPIKES of these.
     """
     rng, mesh = np.random.default_rng(CHECK_SEED), reference.mesh
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)

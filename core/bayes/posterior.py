@@ -61,8 +61,9 @@ class SurfacePosterior(HeightField):
         k(p, q) - k(p, u) k(u, u)^-1 k(u, q) + f(p)' root' root f(q).
 
     mean : (..., 27), of b_10 b_01 b_20 b_11 b_02 b_30 ...
-    root : (..., r, 28 + m), of the features' covariance; the column of the feature 1 is 0 if the height at
-        the origin is exact, as at a reference point that was touched
+    root : (..., r, 28 + m), root' root is the covariance of what multiplies the features: b, the height at
+        the origin and L^-1 g(u); the column of the height is 0 if that is exact, as at a reference point
+        that was touched
     noise : (...), standard deviation of a contact
     visibility : (..., 22, 22), upper triangular: its singular values are how well the contacts show each
         direction among the terms of degree 3 to 6, in units of noise, for a surface of waviness 1; those of a
@@ -156,7 +157,10 @@ class SurfacePosterior(HeightField):
         return np.vstack(self._whitened(p.reshape(-1, 2))).T.reshape(*p.shape[:-1], -1)
 
     def _whitened(self, p: Array) -> tuple[Array, Array]:
-        """L^-1 k(u, p), (m, n), and root @ f(p), (r, n), at points (n, 2)."""
+        """L^-1 k(u, p), (m, n), and root @ f(p), (r, n), at points (n, 2).
+
+        Products of the former are subtracted from k, and those of the latter added: that is the covariance.
+        """
         within = kernel(self.places, p, self.variances) if len(self.places) else np.empty((0, len(p)))
         return self._whitened_sums(monomials(p, TERMS).T, np.ones(len(p)), within)
 

@@ -51,7 +51,10 @@ class Curves(NamedTuple):
 def stacked(
     points: Array, touches: Sequence[Sequence[Contour]]
 ) -> tuple[Array, NDArray[np.bool_], Array | None]:
-    """The points, present and normals of Curves in the order given, for touches at points (b, 3)."""
+    """What `curves_through` takes: contacts, `present` and normals, as in Curves, but in the order given.
+
+    points : (b, 3), the reference points; contacts at these are still there
+    """
     # There is at least one place, which may be empty.
     curves = max([1, *(len(contours) for contours in touches)])
     longest = max([1, *(len(contour.points) for contours in touches for contour in contours)])

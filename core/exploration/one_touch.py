@@ -131,7 +131,10 @@ class Touch:
         return shorter if shorter.result.status == "ok" else found
 
     def _shortened_until_sure(self, found: Exploration) -> Steps:
-        """The touch if it is sure, or else the longest of LEAST_SHARE of its extent or more that is."""
+        """The touch if it is sure ("ok"), or else felt again to the longest shorter extent where it is.
+
+        Extents shrink by the factor SHORTER, to no less than LEAST_SHARE. If none helps, the touch stays.
+        """
         extent = found.extent
         while found.result.status != "ok" and extent > LEAST_SHARE * SHORTER * found.extent:
             extent /= SHORTER

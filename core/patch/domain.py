@@ -149,7 +149,7 @@ class Domain:
         return np.hypot(x, y) <= self._radius(np.arctan2(y, x)) * (1.0 + 1e-5)
 
     def places(self, points: Array) -> Array:
-        """Points (n, 2) as places (n, 2) on the unit disk: by their azimuths and shares of the radius."""
+        """Points (n, 2) as places (n, 2) on the unit disk: divided by the radius at their azimuths."""
         return points / self._radius(np.arctan2(points[:, 1], points[:, 0]))[:, None]
 
     def points_at(self, places: Array) -> Array:
@@ -201,7 +201,8 @@ class Domain:
 def _gauss(ends: int) -> tuple[NDArray[np.intp], Array, Array, Array, Array]:
     """The rule of Domain.nodes: pieces, places and weights of the rays; places and weights along a ray."""
     along, along_weights = np.polynomial.legendre.leggauss(GAUSS_ALONG)  # type: ignore[no-untyped-call]
-    square, outward = np.polynomial.legendre.leggauss(GAUSS_ACROSS)  # type: ignore[no-untyped-call]  # The nodes are in r^2.
+    # The nodes are in r^2.
+    square, outward = np.polynomial.legendre.leggauss(GAUSS_ACROSS)  # type: ignore[no-untyped-call]
     return (
         np.repeat(np.arange(ends), GAUSS_ALONG),
         np.tile(0.5 * (along + 1.0), ends),

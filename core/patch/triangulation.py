@@ -44,7 +44,10 @@ def patch_mesh(surface: HeightField, domain: Domain, tolerance: float) -> tuple[
     mean_radius = math.sqrt(domain.area / math.pi)
 
     def size(points: Array) -> Array:
-        """The distance (n,) of neighbors that the second derivatives allow at points (n, 2)."""
+        """The distance (n,) of neighbors at points (n, 2) with which triangles are within the tolerance.
+
+        It is a length between FINEST_EDGE and COARSEST_EDGE mean radii.
+        """
         flattest = CHORD * tolerance / (COARSEST_EDGE * mean_radius) ** 2
         wanted = np.sqrt(CHORD * tolerance / np.maximum(_chord_error_scale(surface, points), flattest))
         return np.maximum(wanted, FINEST_EDGE * mean_radius)

@@ -190,7 +190,7 @@ def toward_farthest(points: Array) -> Array:
 
 
 def _farthest(distances: Array) -> float:
-    """The largest of the distances (n,), except those of stray contacts, which a gap sets apart."""
+    """The largest of the distances (n,), except of strays: the last FEW, beyond a gap by the factor STRAY."""
     last = np.sort(distances)[-1 - int(FEW * len(distances)) :]
     gaps = np.flatnonzero(last[1:] > STRAY * last[:-1])
     return float(last[gaps[0] if len(gaps) else -1]) if len(last) else 0.0

@@ -57,6 +57,6 @@ def _sweep(folder: Path, start: str, end: str) -> None:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Writes a text in UTF-8, with line ends as they are, as the file `path`."""
+    """Writes a text in UTF-8, with line ends as they are, as the file `path`; raises as `replacing`."""
     with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         file.write(text)

@@ -45,7 +45,10 @@ def shades(values: ArrayLike, limit: float) -> Array:
 
 
 def diverging(values: ArrayLike, limit: float, unknown: ArrayLike = ()) -> Array:
-    """Colors of shades() as linear RGBA, as Blender stores them, gray at the indices that are unknown."""
+    """The colors of shades(), but as linear RGBA (n, 4), as Blender stores them.
+
+    unknown : (k,), indices of values that are not known, which get the gray UNKNOWN instead
+    """
     rgba = shades(values, limit)
     rgba[np.asarray(unknown, dtype=int)] = UNKNOWN
     return linear(rgba)

@@ -203,7 +203,11 @@ class StabilityMap:
         )
 
     def report(self) -> dict[str, Any]:
-        """What was found, as a dict of plain values; medians are over the patches."""
+        """What was found and with which settings, as a dict of plain values; angles are in degrees.
+
+        `patches` are all, also those in doubt; `refused` counts the touches without one by reason. Medians
+        are over the patches that have the value. `extent` and `step` are 0 where touches chose them.
+        """
         reasons = Counter(self.reason[: self.done].tolist())
         counts = {key: reasons[code] for code, key in enumerate(REASON_KEYS)}
         report = {

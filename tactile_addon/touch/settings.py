@@ -71,7 +71,10 @@ _answered = None  # These settings of a probe were looked at last, and nothing h
 
 
 def changed(settings: Any, context: bpy.types.Context) -> None:
-    """Makes the handler look at a probe at once, so that the patch is part of the same undo step."""
+    """Makes the depsgraph handler look at a probe at once, so that the patch is in the same undo step.
+
+    Blender calls this when a property with it as `update` changes; operators' settings are passed over.
+    """
     global _answered
     if _is_silent or not isinstance(settings.id_data, Object) or not settings.is_probe:
         return

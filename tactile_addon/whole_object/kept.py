@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The touches of the last whole object, kept in memory, so that its mesh can be made again without them."""
+"""The touches of the last whole object, kept in memory: its mesh can be made again without new touches."""
 
 from ..touch.types import Object
 from .object_touches import ObjectTouches
