@@ -33,7 +33,7 @@ def unit_of(scene: bpy.types.Scene, size: float) -> Unit:
         return "", 1.0
     name: str = settings.length_unit
     meters = size * settings.scale_length * (1.0 + 1e-6)
-    if name == "ADAPTIVE" or not 1e-2 <= meters / METERS[name][1] <= 1e4:
+    if name == "ADAPTIVE" or not 1e-1 <= meters / METERS[name][1] <= 1e4:
         names = ADAPTIVE[settings.system]
         name = next((n for n in names if LEAST.get(n, 1.0) * METERS[n][1] <= meters), names[-1])
     symbol, meters = METERS[name]

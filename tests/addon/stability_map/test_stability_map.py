@@ -536,7 +536,7 @@ def test_a_map_of_a_plane_is_one_patch_without_error(empty, extension):
     _, record = stability_map(empty)
     report = extension.tactile_addon.stability_map.map_report
     assert report.map_summary(record) == "1 patch at 1 point, 0 in doubt"
-    assert dict(report.map_table_rows(record))["median error"] == "0 m"
+    assert dict(report.map_table_rows(record))["median error"] == "0 cm"
 
 
 def test_a_map_of_few_facets_is_in_doubt_and_says_why(empty, extension):

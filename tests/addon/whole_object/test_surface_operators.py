@@ -48,7 +48,7 @@ def test_where_a_wall_is_thin_the_report_has_the_length_of_edges_that_were_made(
     record = surface["tactile_object"].to_dict()
     assert record["edge"] == before["edge"] == pytest.approx(0.25 * 0.1, rel=0.1)
     rows = dict(extension.tactile_addon.whole_object.object_report.object_rows(record))
-    assert rows["Edge Length"].endswith(" m")
+    assert rows["Edge Length"].endswith(" cm")
 
 
 @pytest.mark.long

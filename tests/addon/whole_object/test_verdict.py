@@ -50,10 +50,10 @@ def test_a_cube_is_a_cube_with_sharp_edges(empty, extension):
     assert (record["status"], record["message"], record["is_closed"]) == ("ok", OK, True)
     assert record["deviation_max"] < 1e-5
     report = extension.tactile_addon.whole_object.object_report
-    agreement = "All of the surface is within the tolerance of 0.004 m, and the farthest place is 0 m off."
+    agreement = "All of the surface is within the tolerance of 0.4 cm, and the farthest place is 0 cm off."
     assert report.object_verdict(record) == f"Good. {OK} {agreement} Good takes 99 % and at most 0.012 m."
     assert report.is_all_within(record)
-    assert dict(report.object_rows(record))["Off the Mesh"] == "0 m"
+    assert dict(report.object_rows(record))["Off the Mesh"] == "0 cm"
     mesh = surface.data
     ends = np.array([edge.vertices for edge in mesh.edges])[values(mesh, "sharp_edge").astype(bool)]
     at_faces = np.isclose(np.abs(positions(mesh)), 1.0, atol=1e-5).sum(axis=1)
