@@ -79,7 +79,8 @@ def agreement(record: Mapping[str, Any]) -> str | None:
     return (
         f"{share} of the surface is within the tolerance of {units.say(tolerance, 1, unit)}, and the "
         f"farthest place is {deviation(record, 'max')} off. "
-        f"Good takes {100.0 * WITHIN_SHARE:g} % and at most {units.say(OFF_TOLERANCES * tolerance, 1, unit)}."
+        f"Good means at least {100.0 * WITHIN_SHARE:g} % within it, and none farther off than "
+        f"{units.say(OFF_TOLERANCES * tolerance, 1, unit)}."
     )
 
 

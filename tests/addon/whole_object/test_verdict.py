@@ -51,7 +51,8 @@ def test_a_cube_is_a_cube_with_sharp_edges(empty, extension):
     assert record["deviation_max"] < 1e-5
     report = extension.tactile_addon.whole_object.object_report
     agreement = "All of the surface is within the tolerance of 0.4 cm, and the farthest place is 0 cm off."
-    assert report.object_verdict(record) == f"Good. {OK} {agreement} Good takes 99 % and at most 0.012 m."
+    rule = "Good means at least 99 % within it, and none farther off than 1.2 cm."
+    assert report.object_verdict(record) == f"Good. {OK} {agreement} {rule}"
     assert report.is_all_within(record)
     assert dict(report.object_rows(record))["Off the Mesh"] == "0 cm"
     mesh = surface.data
@@ -159,7 +160,7 @@ def test_the_verdict_says_how_much_is_within_the_tolerance(empty, extension, bal
     assert re.search(
         r"Doubtful\. .* 9[78][.\d]* % of the surface is within the tolerance of 0\.02 m, and the", words
     )
-    assert words.endswith("m off. Good takes 99 % and at most 0.06 m.")
+    assert words.endswith("cm off. Good means at least 99 % within it, and none farther off than 6 cm.")
     assert not object_report.is_all_within(report | {"status": "ok"})  # So there is no tick.
 
 
