@@ -160,7 +160,7 @@ def test_the_verdict_says_how_much_is_within_the_tolerance(empty, extension, bal
     assert re.search(
         r"Doubtful\. .* 9[78][.\d]* % of the surface is within the tolerance of 0\.02 m, and the", words
     )
-    assert words.endswith("cm off. Good means at least 99 % within it, and none farther off than 6 cm.")
+    assert words.endswith("m off. Good means at least 99 % within it, and none farther off than 0.06 m.")
     assert not object_report.is_all_within(report | {"status": "ok"})  # So there is no tick.
 
 
