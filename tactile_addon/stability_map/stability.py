@@ -55,7 +55,7 @@ def expected_count(obj: Object, depsgraph: bpy.types.Depsgraph, extent: float, s
     if count > MOST_COUNTED:
         return count
     # Long or narrow faces have their middles where others leave no room, as on a letter.
-    middles = read_array(faces, "center", 3) @ linear.T
+    middles: Array = read_array(faces, "center", 3) @ linear.T
     return sum(index is not None for index in core.spaced(middles, spacing, np.random.default_rng(0)))
 
 
