@@ -26,6 +26,8 @@ test-core: BESIDE := -n auto --dist loadfile --no-loadscope-reorder
 test test-core test-long test-cluster: export OMP_NUM_THREADS = 1
 test test-core test-long test-cluster: export OPENBLAS_NUM_THREADS = 1
 
+# The tests among which `make test-long` finds the long ones.
+TESTS := tests
 ZIP := build/tactile_patch.zip
 # Folders too, so that a deleted file counts as a change.
 SOURCES := blender_manifest.toml __init__.py LICENSE tools/build.py \
@@ -70,7 +72,7 @@ test-core: $(READY)
 	$(VENV_PY) -m pytest $(BESIDE) -m "not long" --hypothesis-profile=quick tests/core/scan tests/core tests/test_rooms.py
 
 test-long: $(ZIP)
-	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest $(BESIDE) -m long --ignore tests/cluster
+	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest $(BESIDE) -m long --ignore tests/cluster $(TESTS)
 
 test-cluster: $(CLUSTER)
 	$(VENV_PY) -m mypy cluster
