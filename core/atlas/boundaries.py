@@ -62,13 +62,16 @@ def edges_of(charts: Charts) -> Generator[float, None, list[Edge]]:
         parts.append(_crossings(charts, node))
         yield 0.9 * (node + 1) / count
     nodes, others, rays, points, angles = (np.concatenate(values) for values in zip(*parts, strict=True))
+    pairs: dict[tuple[int, int], list[int]] = {}
+    for i, pair in enumerate(zip(nodes.tolist(), others.tolist(), strict=True)):
+        pairs.setdefault(pair, []).append(i)
     edges = []
-    for a, b in np.unique(np.sort(np.stack([nodes, others], axis=1), axis=1), axis=0).tolist():
-        which = max((np.flatnonzero((nodes == p) & (others == q)) for p, q in ((a, b), (b, a))), key=len)
+    for pair in sorted({(min(p), max(p)) for p in pairs}):
+        which = max(pairs.get(pair, []), pairs.get(pair[::-1], []), key=len)
         # In the order of their rays, beginning after the widest gap between two.
         gaps = np.diff(rays[which], append=rays[which[0]] + RAYS)
         turned = np.roll(which, -1 - int(np.argmax(gaps)))
-        edges.append(Edge((a, b), points[turned], angles[turned]))
+        edges.append(Edge(pair, points[turned], angles[turned]))
         yield 1.0
     return edges
 

@@ -69,6 +69,7 @@ def recolor(obj: Object) -> None:
 
 
 def _least_range(record: Mapping[str, Any], shown: str) -> float:
+    """The smallest range of colors of a quantity, in the unit of its values."""
     if shown in CURVATURES:
         return float(LEAST_BEND * record.get("object_size", record["radius"]) ** POWERS[shown])
     if shown == DEVIATION and record.get("tolerance"):

@@ -43,12 +43,7 @@ def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
         ("fit error (6)", _shared(report, "fit_error", unit)),
         ("standard deviation of the height", _shared(report, "height_std", unit)),
         ("mesh to patch", _verification(report, unit)),
-        *(
-            [("put onto", registration_summary(report["registration"], unit))]
-            if "registration" in report
-            else []
-        ),
-        *_verified_rows(report.get("verification"), unit),
+        *_verified_rows(report, unit),
         ("suggested next plane", _suggestion(report["suggested_plane"], unit)),
         ("total |K| (8)", f"{report['total_absolute_curvature']:.4g}"),
         ("condition number", f"{report['condition_number']:.2g}"),
@@ -147,15 +142,19 @@ def _verification(report: TouchReport, unit: Unit) -> str:
     return f"mean {mean}; largest {farthest}; {many(report['vertices'], 'vertex', 'vertices')}"
 
 
-def _verified_rows(found: Mapping[str, Any] | None, unit: Unit) -> list[tuple[str, str]]:
-    """Rows on the verification against a mesh, which only some reports have."""
+def _verified_rows(report: TouchReport, unit: Unit) -> list[tuple[str, str]]:
+    """Rows on the registration onto a mesh and the verification against it, which only some reports have."""
+    found, rows = report.get("verification"), []
+    if "registration" in report:
+        rows.append(("put onto", registration_summary(report["registration"], unit)))
     if found is None:
-        return []
+        return rows
     names = [name for name in ("vertex", "contact") if f"{name}_distance_mean" in found]
     more = f"{say(found['extra_fit_error'], 1, unit)}, " if "extra_fit_error" in found else ""
     points = many(found["extra_points"], "point", "points")
     curves = many(found["extra_contours"], "curve", "curves")
     return [
+        *rows,
         *((f"{name} distances", _spread(found, f"{name}_distance", unit)) for name in names),
         ("(6) on more curves", f"{more}{points} on {curves}"),
         ("overlap", f"{100.0 * found['overlap']:.0f} % of the area"),
