@@ -20,7 +20,6 @@ METERS = dict(zip((*ADAPTIVE["METRIC"], *ADAPTIVE["IMPERIAL"]), core.UNIT_METERS
 LEAST = {"MILLIMETERS": 1e-2}  # In an adaptive unit lengths are at least 1 or this: few count micrometers.
 LEAST_NUMBER = 10.0  # The unit of a whole object suits this many tolerances.
 SUPERSCRIPTS = {1: "", 2: "²"}
-ROUNDING = 1e-3  # A value below this share of its standard deviation is rounding, and counts as 0.
 
 
 def unit_of(scene: bpy.types.Scene, size: float) -> Unit:
@@ -49,13 +48,18 @@ def unit_of_report(scene: bpy.types.Scene, report: Mapping[str, Any]) -> Unit:
 
 def say(value: float, power: int, unit: Unit, std: float | None = None) -> str:
     """A value in length^power in words, such as "0.0123 mm" or "-4.2 ± 0.3 1/mm²"."""
-    spread = "" if std is None else f" ± {float(f'{std / unit[1] ** power:.1g}'):g}"
-    return f"{known(value, std) / unit[1] ** power:.3g}{spread} {symbol(power, unit)}".strip()
+    scale = unit[1] ** power
+    if std is None:
+        return f"{value / scale:.3g} {symbol(power, unit)}".strip()
+    value, spread = known(value / scale, std / scale), float(f"{std / scale:.1g}")
+    return f"{value:.3g} ± {spread:g} {symbol(power, unit)}".strip()
 
 
-def known(value: float, std: float | None) -> float:
-    """The value, or 0 if it is mere rounding compared with its standard deviation, which may be None."""
-    return 0.0 if std is not None and abs(value) < ROUNDING * std else value
+def known(value: float, std: float) -> float:
+    """The value, rounded to the place of the first digit of its standard deviation."""
+    if not 0.0 < std < math.inf:
+        return value
+    return round(value, -int(f"{std:.0e}".partition("e")[2])) + 0.0  # -0.0 + 0.0 is 0.0.
 
 
 def length(value: float, unit: Unit | None = None) -> str:

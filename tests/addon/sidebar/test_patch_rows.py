@@ -34,8 +34,14 @@ def record(status="ok", message="The patch describes its contacts.", **more):
     return {"status": status, "message": message, "height_std": 0.0123, **more}
 
 
-def test_a_number_that_is_only_rounding_compared_with_its_deviation_is_0(extension):
+def test_a_number_has_no_digit_beyond_the_first_one_of_its_deviation(extension):
     units = extension.tactile_addon.touch.units
+    assert units.say(-0.00303, -1, UNIT, 0.0203) == "0 ± 0.02 1/mm"
+    assert units.say(0.0109, -1, UNIT, 0.0098) == "0.01 ± 0.01 1/mm"
+    assert units.say(-1.7481, -1, UNIT, 0.0302) == "-1.75 ± 0.03 1/mm"
+    assert units.say(437.2, 1, UNIT, 12.0) == "440 ± 10 mm"
+    assert units.say(0.123456, 1, UNIT, 1e-9) == "0.123 ± 1e-09 mm"
+    assert units.say(0.125, 1, UNIT, 0.0) == "0.125 ± 0 mm"
     assert units.say(3.34e-7, -1, UNIT, 7e-4) == "0 ± 0.0007 1/mm"
     assert units.say(-0.002, -1, UNIT, 7e-4) == "-0.002 ± 0.0007 1/mm"
     flat = {"k1": 2e-40, "k2": -1e-7, "k1_std": 0.01, "k2_std": 0.01}
