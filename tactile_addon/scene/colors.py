@@ -15,7 +15,7 @@ COLOR_STOPS = np.array([
 ]) / 255.0  # fmt: skip
 
 # Values are as good as 0 if no more than the share FEW of them are beyond this number of deviations.
-SIGNIFICANT, FEW = 1.645, 0.05
+SIGNIFICANT, FEW = 1.96, 0.05
 UNKNOWN = (0.5, 0.5, 0.5, 1.0)  # The color of what has no value, in sRGB.
 
 

@@ -44,7 +44,7 @@ TIPS = {
     "Overlap": "Share of the patch's area that has mesh below it",
     "Touches": "Number of touches that the object took",
     "Surface": "Closed: felt all round; Open: the object ends there; Incomplete: touches could go on",
-    "Rims Left": "Number of places from which touches could go on",
+    "Goes On At": "Number of places where nothing was felt yet, although the object goes on there",
     "Tolerance": "Standard deviation to reach for the height of each patch",
     "Off the Mesh": "Mean distance of the surface from the mesh and of the mesh from the surface",
     "Edge Length": "Typical length of the surface's edges, at most about a quarter of the thinnest wall",

@@ -22,6 +22,7 @@ from ..touch import units
 from ..touch.touch_object import Touched, plane_axes
 from ..touch.types import Array, Object
 from ..touch.units import Unit
+from .drag import DRAG_TILT, DRAG_TURN
 from .free_view import free_strip
 from .mouse import is_over
 
@@ -116,9 +117,10 @@ def _active(context: bpy.types.Context) -> Object | None:
 
 
 def draw_plane() -> None:
-    """Draws the part of the active sampling plane that its contour may reach, while a handle is dragged."""
+    """Draws the part of a sampling plane that its contour may reach, while it is turned or tilted."""
     context = bpy.context
-    if not _is_running(context, "TACTILE_OT_drag"):
+    drag: Any = _running(context, "TACTILE_OT_drag")
+    if drag is None or drag.properties.what not in (DRAG_TURN, DRAG_TILT):
         return
     obj = probe.probe_of(_active(context))
     record = probe.record_of(obj)
@@ -141,7 +143,7 @@ def draw_legend() -> None:
     """Draws the legend of the active patch, whole object or map: quantity, unit and range."""
     context = bpy.context
     # A pick draws the key of its preview where the legend is.
-    is_picking = _is_running(context, "TACTILE_OT_pick")
+    is_picking = _running(context, "TACTILE_OT_pick") is not None
     if is_picking or not shows_colors(context.space_data) or not _is_last_view(context):
         return
     obj = _active(context)
@@ -169,9 +171,9 @@ def draw_legend() -> None:
         _draw_box(context, *bar, map_object.swatches(obj))
 
 
-def _is_running(context: bpy.types.Context, name: str) -> bool:
-    """Whether the operator of this name waits for events of the window."""
-    return any(operator.bl_idname == name for operator in context.window.modal_operators)
+def _running(context: bpy.types.Context, name: str) -> bpy.types.Operator | None:
+    """The operator of this name that waits for events of the window, or None."""
+    return next((each for each in context.window.modal_operators if each.bl_idname == name), None)
 
 
 def _is_last_view(context: bpy.types.Context) -> bool:

@@ -25,7 +25,9 @@ TOLERANCE_SHARES = {"quick": 1.0 / 200.0, "normal": 1.0 / 500.0, "fine": 1.0 / 1
 LARGEST_TOLERANCE, LARGEST_EDGE = 0.1, 0.5  # With more, neither patches nor triangles would fit.
 STARTS = 20  # The number of places to begin that are tried if none is given.
 PLACES, SEED = 1000, 0  # The progress is the share of this many places on the mesh that patches cover.
-TOUCHED, JOINED = 0.5, 0.8  # Of all that is to be done, touching and joining are done at these shares.
+# Of all that is to be done, touching and joining are done at these shares; of touching and joining again,
+# touching is done at the last one.
+TOUCHED, JOINED, AGAIN = 0.5, 0.8, 0.3
 
 
 class ObjectTouches:
@@ -75,7 +77,7 @@ class ObjectTouches:
         self.words, self.share = "Looking for a place to begin", 0.0
         self.is_stopped = self._is_cut_short = False
         self._left = self._spread()
-        self._rounds, self._is_joining = 0, False
+        self._rounds, self._joined, self._is_joining = 0, 0, False  # The joinings, and the touches before.
         self._area = self._faceted = 0.0
         self._start = None
         if location is not None:
@@ -176,15 +178,23 @@ class ObjectTouches:
         if state.joining is None:
             self._is_joining = False
             # The last touches may still end when it is stopped.
-            self.words = f"Joining {patches}" if self.is_stopped else f"{touches}, {places} to go on from"
-            self.share = max(self.share, TOUCHED * (1.0 - len(self._left) / PLACES))
-            return
-        self._rounds += not self._is_joining
-        self._is_joining = True
-        self.words = f"Joining {patches}" if state.joining < 1.0 else f"Checking the surface of {patches}"
-        # How often it goes back to touching is not known before. Each round has half of what is left.
-        left = 0.5**self._rounds
-        self.share = max(self.share, TOUCHED + (JOINED - TOUCHED) * (1.0 - (2.0 - state.joining) * left))
+            self.words = f"Joining {patches}" if self.is_stopped else f"{touches}, goes on at {places}"
+        else:
+            self._rounds += not self._is_joining
+            self._is_joining, self._joined = True, state.done
+            self.words = f"Joining {patches}" if state.joining < 1.0 else f"Checking the surface of {patches}"
+        self.share = max(self.share, self._share(state))
+
+    def _share(self, state: core.Progress) -> float:
+        """About which share of all is done in a state of the touches."""
+        if not self._rounds:
+            return TOUCHED * (1.0 - len(self._left) / PLACES)
+        # How often it touches and joins again is not known before. Each round has half of what is left.
+        if state.joining is None:
+            done, begun = AGAIN * (1.0 - self._joined / state.done), self._rounds + 1
+        else:
+            done, begun = AGAIN + (1.0 - AGAIN) * state.joining, self._rounds
+        return TOUCHED + (JOINED - TOUCHED) * (1.0 - (2.0 - done) * 0.5**begun)
 
     def meshing(self, start: float = 0.0) -> Iterator[None]:
         """Makes the mesh and compares it in steps, from the share `start` of all on."""

@@ -129,7 +129,8 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball, extension):
     assert not record["is_closed"]
     assert record["uncovered"] > 0
     rows = dict(extension.tactile_addon.whole_object.object_report.object_rows(record))
-    assert (rows["Surface"], rows["Rims Left"]) == ("Incomplete", str(record["uncovered"]))
+    places = f"{record['uncovered']} places"
+    assert (rows["Surface"], rows["Goes On At"]) == ("Incomplete", places)
     # What was not felt is where the mesh is farthest from the surface.
     assert record["deviation_max"] > 1.0
     assert np.linalg.norm(record["deviation_place"]) == pytest.approx(2.0, abs=0.01)
@@ -137,8 +138,7 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball, extension):
     report = extension.tactile_addon.whole_object.object_report
     assert report.object_verdict(record).startswith("Incomplete. The patches end at ")
     assert "allow more touches" in record["message"]
-    places = f"open, with {record['uncovered']} places to go on from"
-    assert report.object_summary(record) == f"Incomplete: 3 touches; {places}"
+    assert report.object_summary(record) == f"Incomplete: 3 touches; the object goes on at {places}"
     assert "Off the Mesh" not in rows  # Most of it would be what was not felt.
 
 

@@ -250,10 +250,11 @@ def test_touching_is_half_of_the_progress(empty, touches_of):
 
 
 @pytest.mark.long
-def test_progress_never_runs_backward(balls, touches_of):
-    words, _ = progress_of(touches_of(balls, tolerance=0.02))
+def test_progress_never_runs_backward_and_goes_on_with_touches(balls, touches_of):
+    words, shares = progress_of(touches_of(balls, tolerance=0.02))
     again = [i for i, word in enumerate(words) if i > words.index("Joining") and word[0].isdigit()]
     assert again and "Joining" in words[again[-1] :]
+    assert len({shares[i] for i in again}) >= len({words[i] for i in again}) > 3
     assert words[-1] == "Comparing"
 
 
