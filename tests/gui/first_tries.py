@@ -36,9 +36,31 @@ def pick(obj, place, **given):
     yield from until(is_complete)
 
 
+def header(place):
+    """What the header says while a pick's mouse is over a place of the world; the pick is canceled."""
+    operator, said = bpy.types.TACTILE_OT_pick, []
+    inner = operator._hover
+    operator._hover = lambda self, context, event: said.append(inner(self, context, event)) or said[-1]
+    window, area, region = gui.find()
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.tactile.pick("INVOKE_DEFAULT", True, new=True)
+    yield 1
+    x, y = (round(v) for v in gui.view_point(place))
+    gui.xdo("mousemove", x - 5, y, "sleep", 0.3, "mousemove", x, y)
+    yield 2
+    picture("header")
+    gui.xdo("key", "Escape")
+    yield 1
+    operator._hover = inner
+    return said[-1]
+
+
 def facets():
     torus = only(bpy.ops.mesh.primitive_torus_add)
     look((0, 0, 0), (1, -1, 1), 5)
+    said = yield from header((0.9, -0.86, 0.1))
+    check("while picking, the header has a verdict that is not good", "Curvature of the facet" in said, said)
+    check("... and Esc leaves nothing", probe() is None)
     yield from pick(torus, (0.9, -0.86, 0.05))
     look(probe().matrix_world.translation, (1, -1, 0.6), 1.5)
     yield 1
