@@ -14,6 +14,8 @@ from ..touch.units import Unit
 from . import shown
 from .patch_record import ATLAS_RECORD, POWERS, RANGE, RECORD, is_colored, report_of
 
+LEAST_DRAWN, SMALL = 1e-3, 1e-6  # Ranges below the first are drawn in units of the second.
+
 
 def unit_of_range(patch: Object, scene: bpy.types.Scene) -> tuple[int, Unit]:
     """The power of length in the quantity that a patch or whole object shows, and the unit of its legend."""
@@ -54,6 +56,13 @@ def _record(obj: Object) -> Any:
     return obj[ATLAS_RECORD] if ATLAS_RECORD in obj else report_of(obj)
 
 
+def range_field(obj: Object) -> tuple[str, str]:
+    """The property to draw for the range, and the factor in its label: a field has six decimals."""
+    return (
+        ("tactile_range", "") if obj.tactile_range >= LEAST_DRAWN else ("tactile_small_range", f"{SMALL:g}")
+    )
+
+
 def _get(obj: Object) -> float:
     power, unit = unit_of_range(obj, bpy.context.scene)
     limit = obj.get(RANGE) or (_record(obj) or {}).get("color_limit", 0.0)
@@ -65,15 +74,21 @@ def _set(obj: Object, value: float) -> None:
     set_range(obj, value * unit[1] ** power)
 
 
-# Properties of objects, by name.
-PROPERTIES = {
-    "tactile_range": FloatProperty(
-        name="Range",
+def _field(name: str, unit: float) -> Any:
+    """A property of the range in this share of the legend's unit."""
+    return FloatProperty(
+        name=name,
         description="Value at which the colors end, in the unit of the legend; 0 chooses it by the values",
         min=0.0,
         precision=4,
         step=0.1,  # It is small compared with usual values in a unit that suits the patch.
-        get=_get,
-        set=_set,
+        get=lambda obj: _get(obj) / unit,
+        set=lambda obj, value: _set(obj, unit * value),
     )
+
+
+# Properties of objects, by name.
+PROPERTIES = {
+    "tactile_range": _field("Range", 1.0),
+    "tactile_small_range": _field("Range in Millionths", SMALL),
 }

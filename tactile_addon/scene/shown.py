@@ -51,10 +51,8 @@ def recolor(obj: Object) -> None:
     shades, record = values(mesh, shown), obj[RECORD if RECORD in obj else ATLAS_RECORD]
     unknown = _unknown(mesh) if shown in CURVATURES else []
     floor = _least_range(record, shown)
-    curvedness = np.delete(values(mesh, "curvedness"), unknown)
-    if shown == "gaussian_curvature" and len(curvedness):
-        # |K| is at most the square of the curvedness. Far below that, as on a cylinder, it is as good as 0.
-        floor = max(floor, LEAST_SHARE * float(np.median(curvedness)) ** 2)
+    if shown == "gaussian_curvature":
+        floor = least_gaussian_range(np.delete(values(mesh, "curvedness"), unknown), floor)
     record["own_limit"] = colors.symmetric_range(np.delete(shades, unknown), floor)
     common = max(obj.get(COMMON_RANGE, 0.0), _error_range(mesh, shown, unknown, floor))
     limit = obj.get(RANGE) or max(record["own_limit"], common)
@@ -66,6 +64,14 @@ def recolor(obj: Object) -> None:
         mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
     mesh.update()
     record["color_limit"] = limit
+
+
+def least_gaussian_range(curvedness: Array, floor: float) -> float:
+    """The smallest range of colors of K on a surface of this curvedness (n,), in 1/length^2.
+
+    |K| is at most the square of the curvedness. Far below that, as on a cylinder, it is as good as 0.
+    """
+    return max(floor, LEAST_SHARE * float(np.median(curvedness)) ** 2) if len(curvedness) else floor
 
 
 def _least_range(record: Mapping[str, Any], shown: str) -> float:

@@ -23,7 +23,7 @@ from ..probes.probe_operators import (
     TACTILE_OT_update,
 )
 from ..scene import patch_record
-from ..scene.color_range import unit_of_range
+from ..scene.color_range import range_field, unit_of_range
 from ..scene.viewports import shows_colors
 from ..stability_map.map_operator import TACTILE_OT_stability_map
 from ..stability_map.map_report import facets as map_facets
@@ -254,9 +254,10 @@ def _draw_range(context: bpy.types.Context, layout: bpy.types.UILayout, patch: O
     row = layout.row(align=True)
     row.use_property_split = False
     power, unit = unit_of_range(patch, context.scene)
-    symbol = units.symbol(power, unit)
+    shown, factor = range_field(patch)
     name = iface("Range" if patch_record.RANGE in patch else "Range (Auto)")
-    row.prop(patch, "tactile_range", text=f"{name} {symbol}".rstrip(), translate=False)
+    words = (name, factor, units.symbol(power, unit))
+    row.prop(patch, shown, text=" ".join(filter(None, words)), translate=False)
     if patch_record.RECORD in patch:
         row.operator(TACTILE_OT_share_range.bl_idname, text="", icon="LINKED")
 

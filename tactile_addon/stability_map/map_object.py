@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
+from ...core.reconstruction.status import CONTRADICTING, DOUBTFUL_STD
 from ..scene import colors, patch_object, patch_record
 from ..scene.attributes import CORNERS, HEIGHT_STD, MAP_COLOR, MEASURES, REASON, TOUCH
 from ..scene.mesh_data import emission, write
@@ -45,6 +46,8 @@ MAP_QUANTITIES = [
     (REASON, "Reason", "Whether there is a patch, and why there is none", 0),
 ]
 LOGARITHMIC = ("condition_number",)  # These have a logarithmic scale from 1.
+# The range reaches at least to where a typical patch would be in doubt: this multiple of that quantity.
+DOUBTFUL = {"error": (CONTRADICTING, HEIGHT_STD), HEIGHT_STD: (DOUBTFUL_STD, "reach")}
 REVERSED = ("reach",)  # Of these much is good, so that red is little: red is bad on every map.
 MAP_POWERS = {name: power for name, _, _, power in MAP_QUANTITIES}
 REFUSED = (0.27, 0.27, 0.27, 1.0)
@@ -108,7 +111,7 @@ def recolor(painted: Object) -> None:
     if shown == REASON:
         rgba, limit = colors.linear(REASON_COLORS)[values.astype(np.intp)], len(REASON_KEYS) - 1.0
     else:
-        limit = _limit(shown, values[values != NOTHING], record["spacing"])
+        limit = _limit(shown, values[values != NOTHING], _least_range(painted, shown))
         table = colors.diverging(np.arange(SHADES), SHADES - 1)
         table = np.vstack([table, colors.linear([REFUSED])])
         share = np.maximum(values, 1.0 if shown in LOGARITHMIC else 0.0)
@@ -121,12 +124,22 @@ def recolor(painted: Object) -> None:
     record["color_limit"] = limit
 
 
-def _limit(shown: str, values: Array, spacing: float) -> float:
+def _limit(shown: str, values: Array, floor: float) -> float:
     """The end of the colors' range."""
     if shown == "blind_share":
         return 1.0
-    floor = 10.0 if shown in LOGARITHMIC else LEAST_RANGE * spacing
     return colors.symmetric_range(values, floor) if len(values) else floor
+
+
+def _least_range(painted: Object, shown: str) -> float:
+    """The smallest range of colors of a quantity, so that red stands for what is bad."""
+    if shown in LOGARITHMIC:
+        return 10.0
+    least = LEAST_RANGE * painted[patch_record.MAP_RECORD]["spacing"]
+    times, other = DOUBTFUL.get(shown, (0.0, shown))
+    values = np.array(painted[VALUES][other])
+    known = values[values != NOTHING]
+    return max(least, times * float(np.median(known))) if len(known) else least
 
 
 def swatches(painted: Object) -> list[tuple[str, tuple[float, ...]]]:

@@ -75,7 +75,9 @@ class TACTILE_OT_touch_all_over(AllOver, bpy.types.Operator):
     edge: EDGE
 
     stop = "Stop Touching and Keep"
+    stopped = "Stopped: no surface was kept"
     _growing = _expected = None
+    _is_ending = False  # Esc was pressed once.
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -111,8 +113,6 @@ class TACTILE_OT_touch_all_over(AllOver, bpy.types.Operator):
             yield
 
     def _done(self) -> Progress:
-        if self._touches.is_stopped:
-            self.stop = "Discard the Surface"
         share = self._touches.share
         return f"{self._touches.words}: {share:.0%}", share
 
@@ -120,11 +120,12 @@ class TACTILE_OT_touch_all_over(AllOver, bpy.types.Operator):
         self._touches.surface.require_source(context)
 
     def _stopped(self, context: bpy.types.Context) -> Outcome:
-        """Has the patches so far joined. If Esc is pressed again, or during meshing, nothing is kept."""
-        if self._touches.is_stopped or not self._touches.found:
-            self._leave(context)
-            return {"CANCELLED"}
-        self._touches.stop()
+        """Has the patches so far joined. If Esc is pressed again, nothing is kept."""
+        if self._is_ending or not self._touches.found:
+            return super()._stopped(context)
+        self._is_ending, self.stop = True, "Discard the Surface"
+        if not self._touches.is_stopped:  # It may be meshing already.
+            self._touches.stop()
         return {"RUNNING_MODAL"}
 
     def _leave(self, context: bpy.types.Context) -> None:

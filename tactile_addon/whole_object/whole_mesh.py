@@ -15,7 +15,7 @@ from ... import core
 from ..scene import colors, patch_object, patch_record, undo
 from ..scene.attributes import COLOR, CORNERS, DEVIATION, HEIGHT_STD, NODE
 from ..scene.mesh_data import ABOVE, emission, fill, own_mesh, write
-from ..scene.shown import ALIKE, recolor, settle_on
+from ..scene.shown import ALIKE, LEAST_BEND, least_gaussian_range, recolor, settle_on
 from ..scene.viewports import show_colors, show_size
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Array, Object
@@ -42,7 +42,7 @@ class GrowingPatches:
         with undo.after_step():  # There is an undo step when the operator ends.
             undo.note_added(obj)
         obj.data.materials.append(emission("Tactile Surface", attribute=COLOR))
-        self._patches: list[tuple[Array, Array]] = []
+        self._patches: list[tuple[Array, Array, Array]] = []
         self._uid, self._size = obj.session_uid, surface.size
         self._placed = np.zeros((0, 8))  # The origin, normal, reach and layer of each patch.
         show_colors()
@@ -56,10 +56,11 @@ class GrowingPatches:
         for r, rim in zip(found, rims, strict=True):
             above = DRAWN_ABOVE + LAYER * self._layer(r.frame, rim.max())
             self._patches.append(_disk(r, rim, above * self._size))
-        points, curvatures = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
+        points, k, curvedness = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
         count = 1 + SPOKES * len(RINGS)
         triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
-        shades = colors.diverging(curvatures, colors.symmetric_range(curvatures, 1e-30))
+        floor = least_gaussian_range(curvedness, LEAST_BEND / self._size**2)
+        shades = colors.diverging(k, colors.symmetric_range(k, floor))
         shades.reshape(-1, count, 4)[:, -SPOKES:] = RIM_COLOR
         fill(obj.data, points, triangles, [(COLOR, shades)])
 
@@ -82,8 +83,8 @@ class GrowingPatches:
         return next((obj for obj in bpy.data.objects if obj.session_uid == self._uid), None)
 
 
-def _disk(r: core.Reconstruction, rim: Array, above: float) -> tuple[Array, Array]:
-    """Points (n, 3) of a patch, on rings around its middle, and their Gaussian curvatures (n,).
+def _disk(r: core.Reconstruction, rim: Array, above: float) -> tuple[Array, Array, Array]:
+    """Points (n, 3) of a patch, on rings around its middle, their Gaussian curvatures and curvedness (n,).
 
     rim : (k SPOKES,), the radii of the patch all round, where the finger felt it end
     above : the height of the points above the patch
@@ -93,7 +94,7 @@ def _disk(r: core.Reconstruction, rim: Array, above: float) -> tuple[Array, Arra
     x, y = np.vstack([np.zeros((1, 2)), *(share * edge for share in RINGS)]).T
     d = r.geometry.derivatives(x, y)
     points = np.column_stack([x, y, d.z]) + above * d.normal
-    return r.frame.to_world(points), r.patch.gaussian_curvature(x, y)
+    return r.frame.to_world(points), r.patch.gaussian_curvature(x, y), r.patch.curvedness(x, y)
 
 
 def _fan() -> Array:

@@ -20,6 +20,7 @@ from common import (
     check,
     data_blocks,
     disturbed,
+    last_report,
     look,
     open_tab,
     picture,
@@ -225,7 +226,7 @@ def by_escape():
 
 
 def while_it_is_meshed():
-    """Esc drops the surface while it is meshed, because nothing is complete then that could be kept."""
+    """While the surface is meshed, one Esc keeps it as while it is touched, and a second one drops it."""
     bpy.context.view_layer.objects.active = bpy.data.objects["Target"]
     before = data_blocks()
     yield from start(target="Target", tolerance=0.0)  # not the last tolerance
@@ -236,8 +237,12 @@ def while_it_is_meshed():
     check("while it is meshed: it is under way", running(), WORDS[-1])
     picture("whole_meshing")
     gui.xdo("mousemove", *ASIDE, "sleep", 0.1, "key", "Escape")
+    yield 0.3
+    check("while it is meshed, one Esc drops nothing", running() or len(surfaces()) == 1, WORDS[-1])
+    gui.xdo("key", "Escape")
     yield from until(lambda: not running(), 20)
-    check("while it is meshed, Esc drops it", is_clean() and data_blocks() == before, data_blocks())
+    check("... and a second one drops it", is_clean() and data_blocks() == before, data_blocks())
+    check("... and says so", last_report() == "Stopped: no surface was kept", last_report())
 
 
 def afterwards():

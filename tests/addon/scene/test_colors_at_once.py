@@ -39,7 +39,7 @@ def test_a_script_has_the_viewports_show_colors_but_not_those_set_otherwise(empt
     assert first.color_type == "RANDOM"
 
 
-def test_patches_share_a_range_and_may_be_given_one(empty, ball):
+def test_patches_share_a_range_and_may_be_given_one(empty, ball, extension):
     empty.context.scene.unit_settings.length_unit = "MILLIMETERS"
     ball.scale = (1.0, 1.0, 0.5)
     empty.context.view_layer.update()
@@ -63,6 +63,13 @@ def test_patches_share_a_range_and_may_be_given_one(empty, ball):
     patches[0].tactile_range = 2e-6  # in 1/mm², as the legend has it
     assert patches[0]["tactile"]["color_limit"] == pytest.approx(2.0, rel=1e-6)
     assert patches[0].tactile_range == pytest.approx(2e-6, rel=1e-6)
+    assert extension.tactile_addon.scene.color_range.range_field(patches[0]) == (
+        "tactile_small_range",
+        "1e-06",
+    )
+    assert patches[0].tactile_small_range == pytest.approx(2.0, rel=1e-6)  # A field has six decimals.
+    patches[0].tactile_small_range = 4.0
+    assert patches[0].tactile_range == pytest.approx(4e-6, rel=1e-6)
     patches[0].tactile_range = 0.0
     assert patches[0]["tactile"]["color_limit"] == own[1]
     patches[1].tactile_colors = "mean_curvature"  # this quantity has another range

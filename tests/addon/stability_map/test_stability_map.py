@@ -375,6 +375,19 @@ def test_a_vertex_without_a_face_is_not_touched(empty, ball):
     assert values(painted.data, "reason")[-1] == PATCH  # it has the reason of the nearest touch
 
 
+def test_a_map_is_red_where_patches_are_about_in_doubt(empty):
+    """All patches of a cylinder have about the same deviation: it is no reason to paint all of them red."""
+    empty.ops.mesh.primitive_cylinder_add()
+    painted, record = stability_map(empty, spacing=0.5)
+    assert record["in_doubt"] == 0
+    found = {name: np.array(painted["tactile_values"][name]) for name in ("error", "height_std", "reach")}
+    good = found["error"] >= 0.0
+    painted.tactile_map_colors = "error"
+    assert painted["tactile_map"]["color_limit"] >= 3.0 * np.median(found["height_std"][good])
+    painted.tactile_map_colors = "height_std"
+    assert painted["tactile_map"]["color_limit"] >= 0.02 * np.median(found["reach"][good])
+
+
 def test_faces_of_no_area_are_nothing_to_feel(empty):
     obj = grid(empty, 4)
     co = positions(obj.data)

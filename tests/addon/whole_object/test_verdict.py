@@ -76,6 +76,10 @@ def test_growing_patches_are_above_the_mesh_and_each_other(empty, extension, tou
         growing.add(touches.found[shown:], touches.rims[shown:])
         shown = len(touches.found)
     points = positions(empty.data.objects["Cube Touches"].data).reshape(shown, -1, 3)
+    shades = np.zeros(4 * points.size // 3, dtype=np.float32)
+    empty.data.objects["Cube Touches"].data.attributes["curvature_color"].data.foreach_get("color", shades)
+    red, green, blue, _ = shades.reshape(shown, -1, 4)[:, 0].T  # in the middle of each patch
+    assert (green > np.maximum(red, blue)).all()  # What is left of K on a flat face is pale.
     faces = [np.argmax(r.frame.axes[:, 2] @ np.vstack([np.eye(3), -np.eye(3)]).T) for r in touches.found]
     above = np.abs(points[:, 0]).max(axis=1) - 1.0
     growing.remove()
