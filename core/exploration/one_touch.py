@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One touch that chooses what is not given. Its generators yield contours to be fitted, as in growth.py."""
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +21,8 @@ HELPS = 0.1  # Share of the mean deviation that one more plane must take off (be
 FINER = 8.0  # Steps are shorter by this factor if curves have too few contacts (benchmarks.atlas --shapes).
 # Half curves next to a contradiction, or all those of a touch in doubt, are shortened by this factor at once
 SHORTER = 1.15  # (benchmarks.real --only taps),
-LEAST_SHARE = 0.25  # but not all of them to less than this share (benchmarks.real --only automatic).
+LEAST_SHARE = 0.25  # but not all of them to less than this share (benchmarks.real --only automatic),
+STRIP = 4.0  # unless this multiple of a strip's width is less.
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,11 +134,11 @@ class Touch:
     def _shortened_until_sure(self, found: Exploration) -> Steps:
         """The touch if it is sure ("ok"), or else felt again to the longest shorter extent where it is.
 
-        Extents shrink by the factor SHORTER, to no less than LEAST_SHARE. If none helps, the touch stays.
+        If none of the `_shorter_extents` helps, the touch stays.
         """
-        extent = found.extent
-        while found.result.status != "ok" and extent > LEAST_SHARE * SHORTER * found.extent:
-            extent /= SHORTER
+        if found.result.status == "ok":
+            return found
+        for extent in _shorter_extents(found):
             try:
                 shorter, _ = self._tapped((yield from self._of_extent(extent)))
             except ValueError:  # So short curves carry no fit, or the given step is longer.
@@ -223,6 +224,23 @@ class Touch:
             ):
                 return replace(found, contours=contours, result=r, planes=(*found.planes, plane))
             counts.flat[worst] = max(2 * MIN_HALF_CONTACTS, int(counts.flat[worst] / STRETCH) // 2 * 2)
+
+
+def _shorter_extents(found: Exploration) -> Iterator[float]:
+    """Extents that shrink by the factor SHORTER to LEAST_SHARE, and to the width of a strip that is narrower.
+
+    Across a strip most half curves are short, and show no curvature in units of a long patch.
+    """
+    origin, extent = found.result.frame.origin, found.extent
+    while extent > SHORTER * LEAST_SHARE * found.extent:
+        extent /= SHORTER
+        yield extent
+    ends = np.array([contour.points[[0, -1]] for contour in found.contours])
+    width = float(np.median(np.linalg.norm(ends - origin, axis=2)))
+    extent = min(extent, STRIP * width)
+    while extent > SHORTER * width:
+        extent /= SHORTER
+        yield extent
 
 
 def _open(contour: Contour) -> Contour:

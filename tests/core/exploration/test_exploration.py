@@ -4,6 +4,7 @@
 
 import numpy as np
 import pytest
+import solids
 import surfaces
 
 import core
@@ -141,6 +142,15 @@ def test_a_touch_is_as_long_as_it_is_sure():
     assert found.result.status == "ok"
     assert explore(Strip(), extent=found.extent).result.status == "ok"
     assert explore(Strip(), extent=1.2 * found.extent).result.status == "uncertain"
+
+
+def test_on_a_narrow_wall_a_touch_is_as_long_as_it_is_sure():
+    """The wall is 1.4 long and .08 wide: curves that run along it do not show how it bends across."""
+    wall, point = solids.block(1.0, 0.7, 0.04), (1.0, 0.1, 0.004)
+    found = explore(wall, point, (1.0, 0.0, 0.0), farthest=1.0)
+    assert found.result.status == "ok"
+    assert 0.06 < found.extent < 0.25
+    assert explore(wall, point, (1.0, 0.0, 0.0), extent=0.25).result.status == "uncertain"
 
 
 def test_rough_curves_are_fitted_where_shorter_ones_carry_no_fit(monkeypatch):
