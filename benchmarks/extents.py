@@ -96,7 +96,7 @@ def _touched(extension, obj, depsgraph, place, extent):
     except ValueError:
         return None
     touched = add_on.touch.touch_object.completed(touched)
-    off = extension.core.height_error(touched.result, touched.surface)
+    off = extension.core.mesh_error(touched.result, touched.surface).height
     return touched.report | {"fit": touched.result.status}, off
 
 

@@ -27,7 +27,7 @@ def touch_all(files, options):
         for block in options.blocks():
             for _, _, found in touches.explored(target, options, block):
                 results = [each.result for each in found if not isinstance(each, ValueError)]
-                kept += [(r, r.status, r.message, core.height_error(r, target.surface)) for r in results]
+                kept += [(r, r.status, r.message, core.mesh_error(r, target.surface).height) for r in results]
     return kept
 
 

@@ -416,7 +416,7 @@ TAPS = {
     "NEAR_RIM": (0.9, 0.95),
     "WITHIN": (0.5, 0.75),
     "SHORTER": (1.1, 1.3),
-    "DOUBTFUL_GAP": (0.05, 0.2),
+    "LARGE_GAP": (0.01, 0.04),
 }
 ENOUGH_AREA = 0.99  # The least share of the largest area: less area costs more than it is worth.
 

@@ -76,7 +76,7 @@ def main():
     ):
         clock.wrap(owner, name, stage)
     clock.wrap(addon.stability_map.stability.StabilityMap, "_note", "noting")
-    clock.wrap(addon.stability_map.stability.core, "height_error", "error")
+    clock.wrap(addon.stability_map.stability.core, "mesh_error", "error")
     columns = (
         "faces",
         "extent",

@@ -29,7 +29,7 @@ from .contours.contour import (
 from .contours.finger import Surface
 from .contours.local_geometry import DegenerateCurvesError, Frame
 from .contours.tracking import track
-from .exploration.mesh_error import height_error, judged_by_mesh
+from .exploration.mesh_error import MeshError, judged_by_mesh, mesh_error
 from .exploration.one_touch import Exploration
 from .exploration.options import ExplorationOptions
 from .exploration.side_by_side import exploring_many
@@ -70,6 +70,7 @@ __all__ = [
     "Frame",
     "Geometry",
     "Mesh",
+    "MeshError",
     "MongePatch",
     "NextTouch",
     "Pose",
@@ -94,11 +95,11 @@ __all__ = [
     "from_dict",
     "gaussian_curvature_stds",
     "has_few_facets",
-    "height_error",
     "in_running_order",
     "is_beside_bend",
     "judged_by_mesh",
     "mean_height_stds",
+    "mesh_error",
     "overlapped",
     "reachable",
     "reconstruct",

@@ -2,35 +2,70 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How far a surface is from a patch all over it, even without vertices, and the patch's verdict from that."""
 
+import math
+from typing import NamedTuple
+
 import numpy as np
 
+from ..arguments import Array
 from ..contours.contour import Vector, along, dot, scaled, vector_of
 from ..contours.finger import Surface, contact_of
 from ..reconstruction.result import Reconstruction
-from ..reconstruction.status import CONTRADICTING
+from ..reconstruction.status import CONTRADICTING, DOUBTFUL_GAP, over_nothing
 
 # benchmarks.refusals counts the patches that are off, but ok.
 MESH_LAYERS = 4  # A sample is compared with no more layers of the mesh above and below it,
 HAIR = 1e-4  # and rays go on this share of their reach beyond each.
+SIDE_HEIGHT = 0.01  # The side of the surface is felt from so far above the point, as a share of the radius.
 
 
-def height_error(r: Reconstruction, surface: Surface) -> float | None:
-    """The mean distance in height of patch and surface over the domain, or None if there is no surface."""
-    points, weights = r.domain.nodes
+class MeshError(NamedTuple):
+    """How far a surface is off a patch, over the domain.
+
+    height : the mean distance in height where there is surface, or None if there is none
+    missing : the share of the area without surface within the radius, above or below
+    """
+
+    height: float | None
+    missing: float = 0.0
+
+
+def mesh_error(r: Reconstruction, surface: Surface) -> MeshError:
+    """How far the surface is off the patch, by rays at the Gauss points of the domain."""
+    return mean_error(r, node_offs(r, surface, side_of(r, surface)))
+
+
+def mean_error(r: Reconstruction, offs: Array) -> MeshError:
+    """The error of the distances `offs` at the nodes of the domain, as `node_offs` has them."""
+    _, weights = r.domain.nodes
+    met = ~np.isnan(offs)
+    height = float(np.average(offs[met], weights=weights[met])) if met.any() else None
+    return MeshError(height, float(weights[~met].sum()))
+
+
+def node_offs(r: Reconstruction, surface: Surface, side: float) -> Array:
+    """The distance in height of patch and surface at each node of the domain (n,); NaN if there is none."""
+    points, _ = r.domain.nodes
     heights = r.height(points[:, 0], points[:, 1])
     up = vector_of(r.frame.axes[:, 2])
     starts = r.frame.to_world(np.column_stack([points, heights])).tolist()
-    offs = [layer_off(surface, vector_of(start), up, r.radius) for start in starts]
-    met = [i for i, off in enumerate(offs) if off is not None]
-    return float(np.average([offs[i] or 0.0 for i in met], weights=weights[met])) if met else None
+    offs = (layer_off(surface, vector_of(start), up, r.radius, side) for start in starts)
+    return np.array([math.nan if off is None else off for off in offs])
 
 
-def judged_by_mesh(r: Reconstruction, mean: float) -> tuple[str, str]:
-    """Status and message: those of the fit, unless it has no doubt but the mesh contradicts it.
+def side_of(r: Reconstruction, surface: Surface) -> float:
+    """1 if the outside of the surface is up at the point, or -1 if it is down: a sheet has either side."""
+    up, reach = vector_of(r.frame.axes[:, 2]), SIDE_HEIGHT * r.radius
+    start = along(vector_of(r.frame.origin), up, reach)
+    hit = surface.ray_cast(start, scaled(up, -1.0), 2.0 * reach)
+    return 1.0 if hit is None else math.copysign(1.0, dot(contact_of(hit, 1.0)[1], up))
 
-    mean : mean distance of the mesh from the patch, a length
-    """
-    std, percent = r.mean_height_std, 100.0 / r.radius
+
+def judged_by_mesh(r: Reconstruction, error: MeshError) -> tuple[str, str]:
+    """Status and message: those of the fit, unless it has no doubt but the mesh contradicts it."""
+    std, percent, mean = r.mean_height_std, 100.0 / r.radius, error.height or 0.0
+    if r.status == "ok" and error.missing > DOUBTFUL_GAP:
+        return over_nothing(error.missing)
     if r.status != "ok" or mean <= CONTRADICTING * std:
         return r.status, r.message
     return "uncertain", (
@@ -40,10 +75,11 @@ def judged_by_mesh(r: Reconstruction, mean: float) -> tuple[str, str]:
     )
 
 
-def layer_off(surface: Surface, start: Vector, up: Vector, reach: float) -> float | None:
+def layer_off(surface: Surface, start: Vector, up: Vector, reach: float, side: float = 1.0) -> float | None:
     """How far along `up`, in either direction, the nearest layer with its outside up is; None beyond `reach`.
 
-    Layers that are seen from inside are another wall of the object, or its other side.
+    Layers that are seen from inside are another wall of the object, or its other side. With the `side` -1,
+    layers with their outside down count instead.
     """
     nearest, hair = None, HAIR * reach
     for sign in (1.0, -1.0):
@@ -53,7 +89,7 @@ def layer_off(surface: Surface, start: Vector, up: Vector, reach: float) -> floa
             hit = surface.ray_cast(along(start, direction, gone), direction, reach - gone)
             if hit is None:
                 break
-            point, normal = contact_of(hit, 1.0)
+            point, normal = contact_of(hit, side)
             gone = abs(dot(along(point, start, -1.0), up))
             if dot(normal, up) > 0.0:
                 nearest = reach = gone

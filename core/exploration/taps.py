@@ -9,22 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..contours.contour import Vector, dot, vector_of
-from ..contours.finger import Surface, contact_of, section
+from ..contours.contour import vector_of
+from ..contours.finger import Surface, contact_of
 from ..patch.domain import GAUSS_ALONG, SAME_END, Domain
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import CONTRADICTING, Taps
-from .mesh_error import height_error
+from .mesh_error import layer_off, mean_error, node_offs, side_of
 
 # benchmarks.real --only taps chooses these. Between the ends of two curves there are four taps at NEAR_RIM of
 # the way to the boundary, and two at WITHIN.
 NEAR_RIM, WITHIN = 0.98, 0.6
+LARGE_GAP = 0.02  # Curves become shorter where more of the area than this share has no surface.
 TOO_FAR_OFF = 10.0  # A tap that is off by more deviations contradicts the fit by itself.
-SIDE_HEIGHT = 0.01  # The side of the surface is felt from so far above the point, as a share of the radius.
 
 
 class Tapped(NamedTuple):
-    """What taps between the curves have found, and the places (k, 2) of those that contradict the fit."""
+    """What taps between the curves have found, and the places (k, 2) that curves should not reach."""
 
     taps: Taps
     contradicting: Array
@@ -53,31 +53,24 @@ def tapped(surface: Surface, r: Reconstruction) -> Tapped:
     offs = np.empty(len(where))
     felt = np.array([contact_of(hit, 1.0)[0] for hit in hits if hit is not None]).reshape(-1, 3)
     offs[met] = np.abs((felt - feet[met]) @ up)
-    offs[~met] = [_height_offset(surface, r, vector_of(foot)) for foot in feet[~met]]
+    side, vertical = side_of(r, surface), vector_of(up)
+    offs[~met] = [
+        math.nan if off is None else off
+        for off in (layer_off(surface, vector_of(foot), vertical, r.radius, side) for foot in feet[~met])
+    ]
     missed, offs = np.isnan(offs), np.nan_to_num(offs)
-    within = height_error(r, surface) or 0.0
+    nodes = node_offs(r, surface, side)
+    within, missing = mean_error(r, nodes)
+    within = within or 0.0
     contradicts = (
         (offs > TOO_FAR_OFF * stds).any()
         or offs.mean() > CONTRADICTING * stds.mean()
         or within > CONTRADICTING * r.mean_height_std
     )
     off = max(float(offs.max()), within) / r.radius if contradicts else 0.0
-    taps = Taps(len(offs), int(missed.sum()), off)
-    return Tapped(taps, where[(offs > CONTRADICTING * stds) & contradicts])
-
-
-def _height_offset(surface: Surface, r: Reconstruction, foot: Vector) -> float:
-    """How far above or below a place the surface is whose outside is up; NaN if there is none within L."""
-    d1, _, up = (vector_of(axis) for axis in r.frame.axes.T)
-    at_point = section(surface, vector_of(r.frame.origin), d1, up, 1.0)
-    point = at_point(complex(0.0, SIDE_HEIGHT * r.radius), -1j, 2.0 * SIDE_HEIGHT * r.radius)
-    side = math.copysign(1.0, dot(point[3], up)) if point else 1.0
-    cast = section(surface, foot, d1, up, side)
-    for direction in (-1j, 1j):
-        hit = cast(0j, direction, r.radius)
-        if hit is not None and dot(hit[3], up) > 0.0:
-            return abs(hit[0].imag)
-    return math.nan
+    gaps = r.domain.nodes[0][np.isnan(nodes) & (missing > LARGE_GAP)]
+    contradicting = where[(offs > CONTRADICTING * stds) & contradicts]
+    return Tapped(Taps(len(offs), int(missed.sum()), off, missing), np.concatenate([contradicting, gaps]))
 
 
 def adjacent_half_curves(r: Reconstruction, where: Array) -> NDArray[np.intp]:

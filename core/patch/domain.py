@@ -17,6 +17,7 @@ from ..arguments import Array
 
 GRID = 600  # The grid (8) over a domain has about this number of points.
 BOUNDARY_SAMPLES = 1024  # With this number of samples the radius of the boundary is right to 1e-5.
+TURN_SAMPLES = 32  # This number of places on each piece shows whether the boundary turns back.
 HULL_PLACES = 32  # This number of places on the hull of contacts bounds a domain.
 INSIDE_HULL = 0.05  # The origin is inside such a hull by at least this share of the radius.
 QUARTER_TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])  # It turns rows counterclockwise.
@@ -78,16 +79,27 @@ class Domain:
     @cached_property
     def _polar(self) -> tuple[Array, Array]:
         """Ascending azimuths and the radii of the boundary there."""
-        chords, (start, slope, bend, third) = self._spline
-        each = math.ceil(BOUNDARY_SAMPLES / len(self.ends))  # Equal numbers keep the ends' symmetry.
-        t = (chords[:, None] / each * np.arange(each))[..., None]
-        start, slope, bend, third = (part[:, None] for part in (start, slope, bend, third))
-        x, y = (start + t * (slope + t * (bend + t * third))).reshape(-1, 2).T
-        azimuths, radii = np.arctan2(y, x), np.hypot(x, y)
-        if np.count_nonzero(np.diff(azimuths, append=azimuths[0]) <= 0.0) > 1:
+        if self._turns_back:
             azimuths, radii = self._without_turning_back()
+        else:  # Equal numbers keep the ends' symmetry.
+            x, y = self._along_spline(math.ceil(BOUNDARY_SAMPLES / len(self.ends))).T
+            azimuths, radii = np.arctan2(y, x), np.hypot(x, y)
         order = np.argsort(azimuths)
         return azimuths[order], radii[order]
+
+    def _along_spline(self, each: int) -> Array:
+        """This number of places on each piece of the closed spline, (m each, 2)."""
+        chords, (start, slope, bend, third) = self._spline
+        t = (chords[:, None] / each * np.arange(each))[..., None]
+        start, slope, bend, third = (part[:, None] for part in (start, slope, bend, third))
+        return (start + t * (slope + t * (bend + t * third))).reshape(-1, 2)
+
+    @cached_property
+    def _turns_back(self) -> bool:
+        """Whether the closed spline is not star-shaped."""
+        x, y = self._along_spline(TURN_SAMPLES).T
+        before = np.arange(-1, len(x) - 1)
+        return bool((x[before] * y <= y[before] * x).any())
 
     def _without_turning_back(self) -> tuple[Array, Array]:
         """Azimuths and radii (BOUNDARY_SAMPLES,) of a periodic monotone cubic r(azimuth) through the ends.
@@ -122,6 +134,10 @@ class Domain:
         points = start + t * (slope + t * (bend + t * third))
         ahead = chords * (slope + t * (2.0 * bend + 3.0 * t * third))
         weights = along * np.abs(points[:, 0] * ahead[:, 1] - points[:, 1] * ahead[:, 0])
+        if self._turns_back:
+            turns = 2.0 * np.pi * (np.arange(len(piece)) + 0.5) / len(piece)
+            points = self.points_at(np.array([np.cos(turns), np.sin(turns)]).T)
+            weights = np.einsum("ni,ni->n", points, points)
         return (out * points).reshape(-1, 2), np.ravel(outward * weights) / weights.sum()
 
     @property

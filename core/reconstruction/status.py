@@ -32,7 +32,7 @@ SCATTERED, SCATTERED_DEVIATIONS = 0.15, 3.0
 CONTRADICTING_CURVE = 7.0  # Deviations by which half of a curve is off what the others show.
 DOUBTFUL_FIT = 0.01  # Share of the radius by which half of the contacts are off, beyond their noise.
 CONTRADICTING = 3.0  # Mean number of deviations by which the surface is off the patch between the curves.
-DOUBTFUL_GAP = 0.1  # Share of the taps between the curves that feel no surface.
+DOUBTFUL_GAP = 0.04  # Share of the area that has no surface: near a straight edge it may be 0.03.
 
 Judged = Any  # A Reconstruction, whose module imports this one.
 
@@ -43,11 +43,13 @@ class Taps(NamedTuple):
     number : how often it tapped
     missed : how often it met no surface within the radius
     off : the largest distance of the surface from the patch, in units of L, if taps contradict it; else 0
+    missing : the share of the patch's area where there is no surface within the radius
     """
 
     number: int
     missed: int = 0
     off: float = 0.0
+    missing: float = 0.0
 
 
 def doubt(r: Judged) -> tuple[str, str] | None:
@@ -79,17 +81,22 @@ def contradicted(r: Judged) -> tuple[str, str] | None:
             "patch, perhaps at an edge or a pocket that no curve crosses: use a shorter extent or add "
             "sampling planes."
         )
-    if taps.missed > DOUBTFUL_GAP * taps.number:
-        if _is_at_edge(r):
-            return "uncertain", (
-                "The point is so near an edge that taps beside it feel no surface: move the point away "
-                "from that edge."
-            )
+    if taps.missed and _is_at_edge(r):
         return "uncertain", (
-            "Between the curves the surface ends, or has a hole that no curve crosses: use a shorter "
-            "extent or add sampling planes."
+            "The point is so near an edge that taps beside it feel no surface: move the point away from that "
+            "edge."
         )
+    if taps.missing > DOUBTFUL_GAP:
+        return over_nothing(taps.missing)
     return None
+
+
+def over_nothing(share: float) -> tuple[str, str]:
+    """The status and a sentence of advice if there is no surface at this share of a patch's area."""
+    return "uncertain", (
+        f"At {100.0 * share:.0f} % of the patch there is no surface, which ends or has a hole between the "
+        "curves: use a shorter extent or add sampling planes."
+    )
 
 
 def _is_at_edge(r: Judged) -> bool:

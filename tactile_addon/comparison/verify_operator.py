@@ -40,7 +40,7 @@ class Verification:
         self._target, self._given = target.session_uid, _inputs(patch, target)
         self._surface: MeshSurface | None = None
         self._found: dict[str, Any] = {}
-        self._off: float | None = None
+        self._error = core.MeshError(None)
         self.done, self.count = 0, 0
 
     def look(self, depsgraph: bpy.types.Depsgraph) -> None:
@@ -73,7 +73,7 @@ class Verification:
             self._found = found
             yield
         # Of a coarse mesh few vertices are over the patch, or none.
-        self._off = core.height_error(r, self)
+        self._error = core.mesh_error(r, self)
 
     def write(self) -> TouchReport:
         """Writes what was found to the patch: its deviations, and `verification` in its record."""
@@ -88,11 +88,15 @@ class Verification:
         shown.recolor(patch)
         shown.share_range(patch)
         record["verification"] = {"target": self.target, **self._found}
-        if self._off is not None:
-            record["height_error"] = self._off
+        height = self._error.height
+        if height is not None:
+            record["height_error"] = height
         if record["status"] != "outdated":
-            mean = max(self._found.get("vertex_distance_mean", 0.0), self._off or 0.0)
-            record.update(judgment(r, mean, record["ended"], record.get("few_facets", False)))
+            mean = max(self._found.get("vertex_distance_mean", 0.0), height or 0.0)
+            # Another mesh, as a scan, may show only a part of the object.
+            missing = self._error.missing if record["source"] == self.target else 0.0
+            error = core.MeshError(mean, missing)
+            record.update(judgment(r, error, record["ended"], record.get("few_facets", False)))
         return record.to_dict()
 
     def _objects(self) -> tuple[Object, Object]:

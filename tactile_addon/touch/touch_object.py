@@ -167,9 +167,9 @@ def completed(touched: Touched, most: int | None = None) -> Touched:
     clock, result, report = [perf_counter()], touched.result, touched.report
     found = _verification_report(touched.surface, result, most)
     # Where vertices are many they would count more, and if faces are large, there may be none in a pocket.
-    off = core.height_error(result, touched.surface)
-    found |= {} if off is None else {"height_error": off}
-    found |= judgment(result, off or 0.0, report["ended"], report["few_facets"])
+    error = core.mesh_error(result, touched.surface)
+    found |= {} if error.height is None else {"height_error": error.height}
+    found |= judgment(result, error, report["ended"], report["few_facets"])
     clock.append(perf_counter())
     plane = suggestion_report(result, np.array(report["axes"]))
     clock.append(perf_counter())

@@ -146,14 +146,14 @@ def stops_at(contours: Sequence[core.Contour], point: Point | Array, reach: floa
     ]
 
 
-def judgment(result: core.Reconstruction, mean: float, ended: str, few_facets: bool) -> TouchReport:
+def judgment(result: core.Reconstruction, error: core.MeshError, ended: str, few_facets: bool) -> TouchReport:
     """Status and message, see core.judged_by_mesh; `ended` is added to the fit's own message.
 
     few_facets : see core.has_few_facets
 
     On a crease or an edge a patch may fit one side. A stability map has none there, so it is in doubt.
     """
-    status, message = core.judged_by_mesh(result, mean)
+    status, message = core.judged_by_mesh(result, error)
     message += ended if message == result.message else ""
     stops = stops_at(result.contours, result.frame.origin, AT_POINT * result.radius)
     if status == "ok" and (stops or few_facets):
@@ -201,7 +201,7 @@ def reconstruction_report(
     """The report of a fit before it is compared with a mesh; arguments as in `judgment`."""
     (d1, d2, n), at_point = result.frame.axes.T.tolist(), result.patch.derivatives(0.0, 0.0)
     return {
-        **judgment(result, 0.0, ended, few_facets),
+        **judgment(result, core.MeshError(None), ended, few_facets),
         "few_facets": few_facets,
         "ended": ended,
         "is_verified": False,

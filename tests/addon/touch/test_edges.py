@@ -3,6 +3,7 @@
 """Parts with edges, and planes: what a touch promises there, and that rounding is said to be 0."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -47,6 +48,41 @@ def test_where_edges_end_curves_a_longer_extent_is_not_advised(empty, cube, plac
     assert (
         report_of(empty, place, plane_count=6, azimuths=[math.pi * i / 6 for i in range(6)])["status"] == "ok"
     )
+
+
+@pytest.fixture
+def letter(empty):
+    """An extruded B, whose face has two holes."""
+    empty.ops.object.text_add()
+    empty.context.object.data.body, empty.context.object.data.extrude = "B", 0.15
+    empty.ops.object.convert(target="MESH")
+    empty.context.object.name = "B"
+    return empty.context.object
+
+
+def touched(bpy, **arguments):
+    """The record of a patch that was compared with the letter."""
+    patch, _ = made(bpy.ops.tactile.reconstruct, target="B", **arguments)
+    assert bpy.ops.tactile.verify() == {"FINISHED"}
+    return patch["tactile"].to_dict()
+
+
+@pytest.mark.parametrize(
+    "location", [(0.1221, 0.6141, 0.15), (0.205, 0.0073, 0.15), (0.452, 0.4222, 0.15), (0.3055, 0.6769, 0.15)]
+)
+def test_a_good_patch_on_a_letter_spans_none_of_its_holes(empty, letter, location):
+    record = touched(empty, location=location)
+    assert record["status"] == "ok"
+    assert record["verification"]["overlap"] > 0.97
+    assert record["area"] > 0.005
+
+
+def test_a_patch_that_spans_a_hole_at_a_given_extent_is_in_doubt(empty, letter):
+    record = touched(empty, location=(0.1221, 0.6141, 0.15), extent=0.1364)
+    assert record["status"] == "uncertain"
+    share = float(re.match(r"At (\d+) % of the patch there is no surface, ", record["message"])[1])
+    assert share == pytest.approx(100.0 * (1.0 - record["verification"]["overlap"]), abs=2.0)
+    assert touched(empty, location=(0.1221, 0.6141, 0.15), extent=0.04)["status"] == "ok"
 
 
 @pytest.mark.parametrize("extent", [0.0, 0.3, 0.8])

@@ -13,7 +13,7 @@ from core import (
     SamplingPlane,
     azimuth_of,
     explore,
-    height_error,
+    mesh_error,
     track,
     verify,
 )
@@ -324,7 +324,7 @@ def test_a_surface_of_single_precision_is_touched_in_double_precision():
         touch = explore(single, exact.point, exact.normal)
         r = touch.result
         vertices = r.frame.to_world(r.mesh()[0]).astype(np.float32)
-        off, report = height_error(r, single), verify(r, single, vertices)
+        off, report = mesh_error(r, single).height, verify(r, single, vertices)
     for contour, other in zip(contours, exact.track(PLANES, extent=10, step=0.5), strict=True):
         assert contour.points.dtype == contour.normals.dtype == np.float64
         assert contour.points == pytest.approx(other.points, abs=1e-5)

@@ -12,7 +12,7 @@ import surfaces
 
 import core
 from core.exploration import side_by_side
-from core.exploration.taps import Tapped, places
+from core.exploration.taps import LARGE_GAP, Tapped, places
 from core.reconstruction.status import DOUBTFUL_GAP, Taps
 
 FARTHEST = 30.0
@@ -80,14 +80,57 @@ def test_an_edge_next_to_the_point_leaves_the_touch_in_doubt():
     assert mean_error(surface, r) > 3.0 * r.mean_height_std
 
 
-def test_a_hole_that_no_curve_crosses_leaves_the_touch_in_doubt():
-    r = explore(Sector(None, azimuths=(2.0, 58.0))).result
+@pytest.mark.parametrize("nearest", [3.0, 6.0, 10.0])
+def test_curves_become_shorter_beside_a_hole_that_none_crosses(nearest):
+    surface = Sector(None, nearest=nearest, azimuths=(2.0, 58.0))
+    r = explore(surface).result
+    assert (r.status, r.taps.off) == ("ok", 0.0)
+    assert share_lacking(surface, r) < DOUBTFUL_GAP
+    assert r.radius > 0.9 * FARTHEST  # the other curves are as long as ever
+
+
+class Washer(Sector):
+    """A flat ring."""
+
+    def __init__(self, inner, outer):
+        self.floor, self.radii = None, (inner, outer)
+
+    def lacks(self, x, y):
+        away = np.hypot(x, y)
+        return (away < self.radii[0]) | (away > self.radii[1])
+
+
+@pytest.mark.parametrize(("away", "azimuth"), [(22.5, 15.0), (26.0, 15.0), (28.0, 30.0), (29.0, 30.0)])
+def test_a_sure_patch_spans_no_hole_of_a_washer(away, azimuth):
+    surface, turn = Washer(15.0, 30.0), math.radians(azimuth)
+    r = explore(surface, (away, 0.0, 0.0), tangent=(math.cos(turn), math.sin(turn), 0.0)).result
+    assert r.status == "ok"
+    assert share_lacking(surface, r) < LARGE_GAP
+    assert r.domain.area > 200.0
+
+
+def share_lacking(surface, r):
+    """The share of the domain's area where the surface is lacking."""
+    points, _ = r.domain.grid(2000)
+    x, y, _ = r.frame.to_world(np.column_stack([points, r.height(*points.T)])).T
+    return surface.lacks(x, y).mean()
+
+
+class Holes(Sector):
+    """A plane that lacks a sector between any two curves."""
+
+    def lacks(self, x, y):
+        turns = np.degrees(np.arctan2(y, x)) % 60.0
+        return (np.hypot(x, y) > self.radii[0]) & (turns > 2.0) & (turns < 58.0)
+
+
+def test_holes_right_beside_the_point_leave_the_touch_in_doubt():
+    r = explore(Holes(None, nearest=0.5)).result
     assert r.status == "uncertain"
     assert r.message.startswith(
-        "Between the curves the surface ends, or has a hole that no curve crosses: use a shorter extent or "
-        "add sampling planes. "
+        "At 100 % of the patch there is no surface, which ends or has a hole between the curves: use a "
+        "shorter extent or add sampling planes. "
     )
-    assert r.taps.missed > DOUBTFUL_GAP * r.taps.number
     assert f" At {r.taps.missed} of {r.taps.number} taps between the curves there is no surface." in r.message
 
 
@@ -103,16 +146,18 @@ def test_a_point_on_an_edge_gets_the_advice_to_move_away():
 
 
 def test_a_touch_in_doubt_becomes_shorter_until_it_is_sure():
-    found = explore(Sector(None, nearest=10.0, azimuths=(2.0, 58.0)))
+    """The edge is a hundredth of a radius away only from shorter curves."""
+    found = explore(Sector(None, nearest=0.0, azimuths=(0.0, 180.0)), (0.0, -0.1, 0.0))
     assert found.result.status == "ok"
-    assert found.result.taps.missed <= DOUBTFUL_GAP * found.result.taps.number
+    assert found.result.taps.missing <= LARGE_GAP
     assert 9.0 < found.extent < 14.0
-    assert {stop for contour in found.contours for stop in contour.stops} == {core.UNEXPLAINED}
+    stops = {stop for contour in found.contours for stop in contour.stops}
+    assert stops == {core.UNEXPLAINED, core.NO_CONTACT}
 
 
-@pytest.mark.parametrize(("nearest", "status"), [(9.0, "ok"), (6.0, "uncertain")])
-def test_it_becomes_no_shorter_than_a_quarter(nearest, status):
-    found = explore(Sector(None, nearest=nearest, azimuths=(2.0, 58.0)))
+@pytest.mark.parametrize(("away", "status"), [(0.1, "ok"), (0.05, "uncertain")])
+def test_it_becomes_no_shorter_than_a_quarter(away, status):
+    found = explore(Sector(None, nearest=0.0, azimuths=(0.0, 180.0)), (0.0, -away, 0.0))
     assert found.result.status == status
     assert found.extent > 0.25 * FARTHEST
 
@@ -122,18 +167,19 @@ def test_a_touch_is_in_doubt_where_the_surface_is_off_within_its_rim():
     pit = Sector(floor=-2.0, nearest=18.0, farthest=22.0)
     longest = core.explore(pit, (0.0, 0.0, 0.0), UP, extent=FARTHEST).result
     assert longest.status == "ok"
-    assert core.height_error(longest, pit) > 3.0 * longest.mean_height_std
+    assert core.mesh_error(longest, pit).height > 3.0 * longest.mean_height_std
     shorter = explore(pit)
     assert (shorter.result.status, shorter.result.taps.off) == ("ok", 0.0)
     assert 0.25 * FARTHEST < shorter.extent < 18.0
-    assert core.height_error(shorter.result, pit) < 1e-6
+    assert core.mesh_error(shorter.result, pit).height < 1e-6
 
 
 def test_a_small_hole_is_reported_and_is_no_doubt():
     r = explore(Sector(None, nearest=16.0, farthest=20.0, azimuths=(10.0, 30.0))).result
     assert r.status == "ok"
     assert r.message.startswith("The patch describes its contacts. ")
-    assert 0 < r.taps.missed <= DOUBTFUL_GAP * r.taps.number
+    assert r.taps.missed > 0
+    assert r.taps.missing <= LARGE_GAP
     assert f" At {r.taps.missed} of {r.taps.number} taps between the curves there is no surface." in r.message
 
 
@@ -165,16 +211,18 @@ def test_where_taps_agree_nothing_changes(surface, noise, monkeypatch):
     without_taps(monkeypatch)
     other = core.explore(surface, surface.point, surface.normal, rng=generators[1], **given)
     assert one.result.status == "ok"
-    assert one.result.taps == (36, 0, 0.0)
+    assert one.result.taps == (36, 0, 0.0, 0.0)
     assert json.dumps(core.to_dict(one.result)) == json.dumps(core.to_dict(other.result))
     assert generators[0].random() == generators[1].random()  # taps draw no noise
 
 
 def test_a_sheet_is_tapped_from_either_side():
-    for floor, status in ((-4.0, "ok"), (None, "uncertain")):
+    for floor in (-4.0, None):
         sheet = Sector(floor, azimuths=(-58.0, -2.0))
         found = [explore(sheet, outward=up, tangent=(1.0, 0.0, 0.0)).result for up in (UP, (0.0, 0.0, -1.0))]
-        assert [r.status for r in found] == [status] * 2
+        assert [r.status for r in found] == ["ok"] * 2
+        assert [r.taps.missing for r in found] == pytest.approx([found[0].taps.missing] * 2, abs=1e-12)
+        assert [r.domain.area for r in found] == pytest.approx([found[0].domain.area] * 2)
         assert [(r.taps.missed, r.taps.off) for r in found] == [(found[0].taps.missed, found[0].taps.off)] * 2
 
 

@@ -40,6 +40,22 @@ def test_the_boundary_is_the_closed_cubic_spline_over_the_chords(ends):
     assert domain.contains(*points.T).all()
 
 
+@pytest.mark.parametrize(
+    ("radii", "is_open"),
+    [
+        ([1, 1, 1, 0.02, 0.02, 0.56], [0, 0, 0, 0, 0, 1]),
+        ([1, 0.37, 0.04, 0.04, 0.1, 0.5], [1, 0, 0, 1, 0, 1]),
+    ],
+)
+def test_means_over_the_nodes_are_those_over_the_grid_where_the_spline_turns_back(radii, is_open):
+    domain = closed_spline_domain(circle(SIXTH - 120.0) * np.array(radii)[:, None], 1.0, is_open)
+    (points, weights), (grid, _) = domain.nodes, domain.grid(20000)
+    assert weights.sum() == pytest.approx(1.0, rel=1e-12)
+    assert domain.contains(*points.T).all()
+    assert weights @ points == pytest.approx(grid.mean(axis=0), abs=5e-3)
+    assert (weights * points.T) @ points == pytest.approx(grid.T @ grid / len(grid), abs=5e-3)
+
+
 @pytest.mark.parametrize("ends", [circle(SIXTH), UNEVEN, STUBBY], ids=["even", "uneven", "stubby"])
 def test_the_boundary_passes_through_the_ends_in_any_order(ends):
     rng = np.random.default_rng(0)
