@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..arguments import Array
 from ..reconstruction.result import Reconstruction
 
-# benchmarks.facets chose these.
+# benchmarks.facets shows how far curvatures are off with these.
 OTHER = 0.27  # Curvatures are those of a facet if they are off by this share of the larger one of the shape,
 SPAN = 2.0  # which follows from how facets turn within this many widths of the point.
 # Edges between these angles stand for a smooth bend,
