@@ -5,22 +5,17 @@
 import math
 from collections.abc import Callable
 from functools import cache
-from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import Array
-from ..patch.differential_geometry import Derivatives
-from ..patch.monge import exponents, monomials
 from ..reconstruction.result import Reconstruction
 
-# benchmarks.facets chose these.
-FEW = 8  # On fewer facets a curvature is off by about as much as the larger one is;
-SEVERAL = 20  # on fewer than this number too, if a paraboloid has other curvatures,
-OTHER = 0.28  # by this share of the largest one.
-MANY = 40  # If contacts lie on this number of faces, the mesh is fine, even where it is flat.
+# benchmarks.facets shows how far curvatures are off with these.
+OTHER = 0.27  # Curvatures are those of a facet if they are off by this share of the larger one of the shape,
+SPAN = 2.0  # which follows from how facets turn within this many widths of the point.
 # Edges between these angles stand for a smooth bend,
 DISTINCT_COSINE, SMOOTH_COSINE = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))
 # if both facets have this share of the wider one's width, and of the radius; else one is a fillet.
@@ -39,10 +34,10 @@ class Facet(NamedTuple):
 def has_few_facets(
     r: Reconstruction, face_near: Callable[[Array], int], corners_of: Callable[[int], ArrayLike]
 ) -> bool:
-    """Whether contacts lie on so few facets, which stand for a smooth shape, that the curvature is theirs.
+    """Whether a facet at the point, which stands for a smooth shape, has other curvatures than that shape.
 
-    Facets of different directions count. Fewer than FEW are too few. Fewer than SEVERAL are, if the
-    paraboloid nearest to the same contacts, which cannot follow facets, has other curvatures.
+    The curvatures of the shape are those by which normals turn from facet to facet. A mesh whose facets are
+    narrow, compared with the radius, is fine.
 
     face_near : the number of the face nearest to a point (3,) of the world
     corners_of : the corners (k, 3) of a face in the world, in order
@@ -50,22 +45,18 @@ def has_few_facets(
     Facets whose edges are all sharp, as those of a cube, are the shape itself.
     """
     shape = cache(lambda face: _facet(corners_of(face)))
-    touched: dict[int, Facet] = {}
-    distinct: list[Array] = []
-    points = np.vstack([contour.points for contour in r.contours])
-    for point in points[np.argsort(np.linalg.norm(points - r.frame.origin, axis=1), kind="stable")]:
-        face = face_near(point)
-        if face in touched or not (facet := shape(face)).width:
-            continue
-        touched[face] = facet
-        if all(facet.normal @ normal < DISTINCT_COSINE for normal in distinct):
-            distinct.append(facet.normal)
-        if len(distinct) == SEVERAL or len(touched) == MANY:
-            return False
-    if len(distinct) >= FEW and not _follows_facets(r, points):
+    width = shape(face_near(r.frame.origin)).width
+    if width < MIN_WIDTH_RATIO * r.radius:  # The mesh is fine.
         return False
-    nearest = islice(touched.values(), FEW)
-    return any(_is_smooth(facet, r.radius, lambda at: shape(face_near(at))) for facet in nearest)
+    points = np.vstack([contour.points for contour in r.contours]) - r.frame.origin
+    points = r.frame.origin + SPAN * width / r.radius * points
+    faces = [face_near(point) for point in points]
+    around, wide = map(shape, set(faces)), max(width, r.radius)
+    if not any(_is_smooth(facet, wide, lambda at: shape(face_near(at))) for facet in around):
+        return False
+    turning = _turning(r, points, [shape(face) for face in faces])
+    off = np.abs(turning - np.sort([r.k1, r.k2])).max()
+    return bool(off > OTHER * np.abs(turning).max())
 
 
 def is_beside_bend(
@@ -79,13 +70,21 @@ def is_beside_bend(
     return _is_smooth(facet, 0.0, lambda at: _facet(corners_of(face_near(at))))
 
 
-def _follows_facets(r: Reconstruction, points: Array) -> bool:
-    """Whether the paraboloid nearest to points (n, 3) of the world has other curvatures than the fit."""
-    local = r.frame.to_local(points) / r.radius
-    b = np.linalg.lstsq(monomials(local, exponents(1, 2)), local[:, 2], rcond=None)[0]
-    even = Derivatives(np.zeros(()), b[0], b[1], 2.0 * b[2], b[3], 2.0 * b[4]).principal_curvatures
-    both = np.array([even, (r.radius * r.k1, r.radius * r.k2)])
-    return bool(np.abs(np.ptp(both, axis=0)).max() > OTHER * np.abs(both).max())
+def _turning(r: Reconstruction, points: Array, facets: list[Facet]) -> Array:
+    """The principal curvatures (2,), in order, by which normals turn between the facets at points (n, 3).
+
+    They are those of the Weingarten map W that fits normals as -W x by least squares, where x is along the
+    tangent plane. Facets count the less the steeper they are, and not at all beyond a right angle.
+    """
+    corners, normals = np.array([(facet.corners[0], facet.normal) for facet in facets]).swapaxes(0, 1)
+    feet = points - np.sum((points - corners) * normals, axis=1, keepdims=True) * normals
+    (u, v, _), (a, b, c) = r.frame.to_local(feet).T, (normals @ r.frame.axes).T
+    outward = np.sign(c[np.argmin(u**2 + v**2)])  # The corners of faces go either way around.
+    weights, zero = np.maximum(outward * c, 0.0), np.zeros_like(u)
+    rows = np.vstack([np.column_stack([u, v, zero]), np.column_stack([zero, u, v])])
+    weights, turned = np.tile(weights, 2), -outward * np.concatenate([a, b])
+    xx, xy, yy = np.linalg.lstsq(weights[:, None] * rows, weights * turned, rcond=None)[0]
+    return np.linalg.eigvalsh([[xx, xy], [xy, yy]])
 
 
 def _is_smooth(facet: Facet, radius: float, facet_near: Callable[[Array], Facet]) -> bool:

@@ -236,6 +236,26 @@ def test_a_flat_face_is_no_facet(empty, shape):
     assert abs(record["k1"]) < 1e-3
 
 
+@pytest.mark.parametrize("extent", [0.0, 0.6])
+def test_the_wall_of_a_cylinder_has_one_verdict_from_its_middle_to_its_rim(empty, extent):
+    empty.ops.mesh.primitive_cylinder_add()
+    for z in (0.0, 0.2, 0.4, 0.45, 0.5, 0.55):
+        record = made(empty.ops.tactile.reconstruct, location=(0.049, 0.995, z), extent=extent)[1]
+        assert (record["k1"], record["k2"]) == pytest.approx((-1.0, 0.0), abs=0.15)
+        assert not record["few_facets"]
+        empty.context.view_layer.objects.active = empty.data.objects["Cylinder"]
+
+
+def test_a_flat_face_between_round_edges_is_no_facet(empty, cube):
+    modifier = cube.modifiers.new("Bevel", "BEVEL")
+    modifier.width, modifier.segments = 0.3, 3
+    empty.context.view_layer.update()
+    for extent in (0.0, 0.2, 0.6):
+        record = made(empty.ops.tactile.reconstruct, location=(0.1, 0.2, 1.0), extent=extent)[1]
+        assert not record["few_facets"]
+        empty.context.view_layer.objects.active = cube
+
+
 def test_a_fine_scan_has_no_few_facets(empty, scans):
     empty.ops.wm.ply_import(filepath=str(scans / "pear.ply"))
     places = [vertex.co.copy() for vertex in empty.context.object.data.vertices]

@@ -50,10 +50,14 @@ def arc(facets, bend=60.0):
     return Prism(np.column_stack([np.sin(angles), np.cos(angles)]))
 
 
-def has_few(prism, extent, x=0.01):
+def touched(prism, extent, x):
     z = np.interp(x, *prism.profile.T)
     r = core.explore(prism, (x, 0.0, z), UP, extent=extent).result
-    return core.has_few_facets(r, prism.face_near, prism.corners_of)
+    return r, core.has_few_facets(r, prism.face_near, prism.corners_of)
+
+
+def has_few(prism, extent, x=0.01):
+    return touched(prism, extent, x)[1]
 
 
 @pytest.mark.parametrize(
@@ -62,6 +66,23 @@ def has_few(prism, extent, x=0.01):
 )
 def test_few_facets_of_an_arc_are_not_its_shape(facets, extent, few):
     assert has_few(arc(facets), extent) is few
+
+
+@pytest.mark.parametrize(
+    ("facets", "extent", "x", "few"),
+    [
+        (9, 0.1, 0.1, True),
+        (4, 0.6, 0.01, True),
+        (6, 0.6, 0.01, True),
+        (6, 0.6, 0.1, False),
+        (7, 0.6, 0.1, False),
+        (8, 0.6, 0.1, False),
+    ],
+)
+def test_the_curvature_of_an_arc_is_that_of_facets_where_it_is_off(facets, extent, x, few):
+    r, said = touched(arc(facets), extent, x)
+    assert said is few
+    assert (max(abs(r.k1 + 1.0), abs(r.k2)) > 0.3) is few
 
 
 class Mesh:
