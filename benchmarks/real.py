@@ -412,7 +412,7 @@ def choose(scans, count):
 # Values of the taps' constants that are tried instead of what they are, one at a time.
 TAPS = {
     "TOO_FAR_OFF": (5.0, 7.0, 14.0, 20.0),
-    "CONTRADICTING": (2.0, 4.0),
+    "CONTRADICTING": (1.5, 3.0),
     "NEAR_RIM": (0.9, 0.95),
     "WITHIN": (0.5, 0.75),
     "SHORTER": (1.1, 1.3),

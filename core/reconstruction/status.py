@@ -31,7 +31,7 @@ CONTRADICTED = 0.01
 SCATTERED, SCATTERED_DEVIATIONS = 0.15, 3.0
 CONTRADICTING_CURVE = 7.0  # Deviations by which half of a curve is off what the others show.
 DOUBTFUL_FIT = 0.01  # Share of the radius by which half of the contacts are off, beyond their noise.
-CONTRADICTING = 3.0  # Mean number of deviations by which the surface is off the patch between the curves.
+CONTRADICTING = 2.0  # Mean number of deviations by which the surface is off the patch between the curves.
 DOUBTFUL_GAP = 0.04  # Share of the area that has no surface: near a straight edge it may be 0.03.
 
 Judged = Any  # A Reconstruction, whose module imports this one.
