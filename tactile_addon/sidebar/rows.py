@@ -54,7 +54,7 @@ TIPS = {
     "Patches": "Number of touches that gave a patch",
     "No Patch": "Number of touches that gave no patch, by reason",
     "… in Doubt": "Number of these patches that are in doubt",
-    "… Without Curvature": "Number of these vertices whose curvatures are unknown, beside edges and rims",
+    "… No Curvature": "Number of these vertices whose curvatures are unknown, beside edges and rims",
 }
 
 

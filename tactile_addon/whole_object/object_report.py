@@ -123,7 +123,7 @@ def object_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("Patches", record["patches"]),
         ("Edge Length", _edge(record)),
         ("Vertices", record["vertices"]),
-        ("… Without Curvature", record.get("unknown_curvatures") or None),
+        ("… No Curvature", record.get("unknown_curvatures") or None),
     )
 
 

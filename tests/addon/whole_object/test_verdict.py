@@ -221,7 +221,7 @@ def test_closed_is_the_mesh_that_is_shown(extension, left_out, shown, uncovered,
     assert report["message"] == words
     rows = extension.tactile_addon.whole_object.object_report.object_rows
     shown_rows = dict(rows(report | {"tolerance": 0.1, "uncovered": len(uncovered)}))
-    assert shown_rows["… Without Curvature"] == "1"
+    assert shown_rows["… No Curvature"] == "1"
     assert shown_rows["Surface"] == ("Closed" if is_closed else "Incomplete" if uncovered else "Open")
 
 
