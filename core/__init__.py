@@ -44,13 +44,16 @@ from .reconstruction.next_plane import azimuth_of, suggest_plane
 from .reconstruction.options import METHODS
 from .reconstruction.result import Reconstruction
 from .reconstruction.serialization import from_dict, to_dict
+from .reconstruction.status import CONTRADICTING, DOUBTFUL_STD
 from .scan.facets import has_few_facets, is_beside_bend
 from .scan.pose_search import Pose, register
 from .scan.sampling import scattered, spaced, spaced_count
 from .scan.verification import reachable, verify, verifying
 
 __all__ = [
+    "CONTRADICTING",
     "CREASE",
+    "DOUBTFUL_STD",
     "EXTENT",
     "METHODS",
     "NOT_MONGE",

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
-from ...core.reconstruction.status import CONTRADICTING, DOUBTFUL_STD
+from ... import core
 from ..scene import colors, patch_object, patch_record
 from ..scene.attributes import CORNERS, HEIGHT_STD, MAP_COLOR, MEASURES, REASON, TOUCH
 from ..scene.mesh_data import emission, write
@@ -47,7 +47,7 @@ MAP_QUANTITIES = [
 ]
 LOGARITHMIC = ("condition_number",)  # These have a logarithmic scale from 1.
 # The range reaches at least to where a typical patch would be in doubt: this multiple of that quantity.
-DOUBTFUL = {"error": (CONTRADICTING, HEIGHT_STD), HEIGHT_STD: (DOUBTFUL_STD, "reach")}
+DOUBTFUL = {"error": (core.CONTRADICTING, HEIGHT_STD), HEIGHT_STD: (core.DOUBTFUL_STD, "reach")}
 REVERSED = ("reach",)  # Of these much is good, so that red is little: red is bad on every map.
 MAP_POWERS = {name: power for name, _, _, power in MAP_QUANTITIES}
 REFUSED = (0.27, 0.27, 0.27, 1.0)

@@ -383,7 +383,7 @@ def test_a_map_is_red_where_patches_are_about_in_doubt(empty):
     found = {name: np.array(painted["tactile_values"][name]) for name in ("error", "height_std", "reach")}
     good = found["error"] >= 0.0
     painted.tactile_map_colors = "error"
-    assert painted["tactile_map"]["color_limit"] >= 3.0 * np.median(found["height_std"][good])
+    assert painted["tactile_map"]["color_limit"] >= 2.0 * np.median(found["height_std"][good])
     painted.tactile_map_colors = "height_std"
     assert painted["tactile_map"]["color_limit"] >= 0.02 * np.median(found["reach"][good])
 
@@ -531,10 +531,13 @@ def test_a_probe_finds_the_place_that_a_map_touched(empty, vase, extension):
 
 
 def test_wide_faces_have_the_values_of_their_own_touches_and_not_of_narrow_ones_beside(empty):
-    """The corners of a plate are nearest to the middles of its narrow faces, which have no sure patches."""
+    """The corners of a plate are nearest to the middles of its narrow faces, which have no sure patches.
+
+    They have none of the given extent. The automatic one is shorter there.
+    """
     empty.ops.mesh.primitive_cube_add()
     empty.context.object.scale = (1.0, 0.7, 0.04)
-    painted, record = stability_map(empty)
+    painted, record = stability_map(empty, extent=0.5)
     assert record["patches"] - record["in_doubt"] == 2 < record["touched"]
     assert np.all(values(painted.data, "reason") == PATCH)
     painted.tactile_map_colors = "reason"
