@@ -9,8 +9,8 @@ Scans, some of them ribbed or sharp-edged, and a ball are touched without noise 
 area). The touch chooses its extent, or a fixed one is given; it always chooses its step. The Markdown table
 has medians over the patches without a warning: the radius, the area, and the mean distance of patch and mesh
 along the normal over the domain; `all areas` is the sum of the areas. `contradicted` patches have no doubt of
-their own, but carry a warning because the mesh is off them by more than three times their deviation. `silent`
-patches have no warning and are off by more than five times their deviation.
+their own, but carry a warning because the mesh is off them by more than twice their deviation, or because
+the curvature is that of facets. `silent` patches have no warning and are off by more than five times it.
 """
 
 import argparse
