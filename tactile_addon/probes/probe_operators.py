@@ -21,6 +21,7 @@ from .operators import (
     has_patch,
     is_in_object_mode,
     is_unlocked,
+    make_active,
     polls,
     report_done,
     report_error,
@@ -208,7 +209,10 @@ class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
+        target = found.tactile_probe.target
         patch_object.remove_objects([*patch_record.parts_of(probe.patch_of(found)), found])
+        if target is not None:  # What comes next, as another pick, is about it.
+            make_active(context, target)
         return {"FINISHED"}
 
 

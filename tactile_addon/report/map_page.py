@@ -9,8 +9,7 @@ import bpy
 import numpy as np
 
 from ..scene import patch_record
-from ..scene.attributes import HEIGHT_STD, MAP_COLOR, REASON
-from ..scene.mesh_data import values
+from ..scene.attributes import HEIGHT_STD, MAP_COLOR, REASON, TOUCH
 from ..stability_map import map_object
 from ..stability_map.map_report import map_summary, map_table_rows
 from ..stability_map.stability import NOTHING
@@ -34,7 +33,7 @@ def map_page(painted: Object) -> str:
                 painted.data, read_array(painted.data.attributes[MAP_COLOR].data, "color_srgb", 4)
             ),
         ),
-        *_errors(painted.data, record, unit),
+        *_errors(painted, record, unit),
         *parts.ending(map_table_rows(record), record),
     ]
     return page.page(f"{painted.name}: a stability map of {record['source']}", sections)
@@ -52,21 +51,25 @@ def _legend(painted: Object, record: Mapping[str, Any], unit: Unit) -> str:
     return page.words(f"{title}: pale green at {low}, dark red from {high} on.") + swatches
 
 
-def _errors(mesh: bpy.types.Mesh, record: Mapping[str, Any], unit: Unit) -> list[str]:
-    errors = values(mesh, "error")
-    known = errors != NOTHING
-    if not known.any():
+def _errors(painted: Object, record: Mapping[str, Any], unit: Unit) -> list[str]:
+    """The sections on errors, in which each touch counts by the area that has its color."""
+    mesh, found = painted.data, painted[map_object.VALUES]
+    errors, stds = (np.array(found[name]) for name in ("error", HEIGHT_STD))
+    corners = read_array(mesh.polygons, "loop_total", dtype=np.int32)
+    areas = np.repeat(read_array(mesh.polygons, "area") / corners, corners)
+    weights = np.bincount(
+        read_array(mesh.attributes[TOUCH].data, "value", dtype=np.int32), areas, len(errors)
+    )
+    counts = (weights > 0.0) & (errors != NOTHING)
+    if not counts.any():
         return []
-    weights, std = np.ones(known.sum()), float(np.median(values(mesh, HEIGHT_STD)[known]))
+    errors, weights, std = errors[counts], weights[counts], float(np.median(stds[counts]))
     size = (record["extent"], "extent") if record["extent"] else (record["reach_median"], "median reach")
     words = (
-        "Shares of the vertices by the error of the touch whose values they have. The last bar counts "
-        "all larger errors."
+        "Shares of the area by the error of the touch whose color it has. The last bar counts all larger "
+        "errors."
     )
     return [
-        page.section("Errors", parts.spread(errors[known], weights, unit, words)),
-        page.section(
-            "Tolerance bands",
-            parts.bands(errors[known], weights, std, unit, parts.shares_of(*size)),
-        ),
+        page.section("Errors", parts.spread(errors, weights, unit, words)),
+        page.section("Tolerance bands", parts.bands(errors, weights, std, unit, parts.shares_of(*size))),
     ]

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What pages have in common: deviations, tolerance bands, settings and versions."""
 
+import math
 import platform
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -45,8 +46,10 @@ def bands(
     """The shares of the weights (n,) within named lengths, and within one to three standard deviations."""
 
     def row(name: str, reach: float, due: str = "") -> tuple[str, ...]:
-        within = weights[np.abs(values) <= reach].sum() / weights.sum()
-        return name, units.say(reach, 1, unit), f"{100.0 * within:.1f} %", due
+        is_within = np.abs(values) <= reach
+        share = 1.0 if is_within.all() else weights[is_within].sum() / weights.sum()
+        # It is rounded down: only all of it is 100 %.
+        return name, units.say(reach, 1, unit), f"{math.floor(1e3 * share + 1e-9) / 10.0:.1f} %", due
 
     rows = [row(*reach) for reach in reaches]
     rows += [

@@ -13,6 +13,7 @@ from ..touch.types import Array, Object
 from .attributes import DOMAIN, KEYS, POSITION, TYPES, attribute_of
 from .undo import note_copied
 
+ABOVE_MESH = "Above the Mesh"  # The modifier that draws an object above the mesh in which it lies.
 ABOVE = "tactile_above"  # A custom property of objects: how far above its mesh it is drawn.
 
 
@@ -66,6 +67,13 @@ def own_mesh(obj: Object) -> None:
 def corners_of(mesh: bpy.types.Mesh) -> Array:
     """The indices (m, 3) of the corners of the triangles of a mesh that has no other faces."""
     return read_array(mesh.loops, "vertex_index", dtype=np.int32).reshape(-1, 3)
+
+
+def draw_above(obj: Object, height: float) -> bpy.types.Modifier:
+    """Draws an object this far along its normals, by a modifier, which is returned."""
+    above: Any = obj.modifiers.get(ABOVE_MESH) or obj.modifiers.new(ABOVE_MESH, "DISPLACE")
+    above.mid_level, above.strength = 0.0, height
+    return above
 
 
 def emission(

@@ -256,8 +256,10 @@ def _draw_range(context: bpy.types.Context, layout: bpy.types.UILayout, patch: O
     power, unit = unit_of_range(patch, context.scene)
     shown, factor = range_field(patch)
     name = iface("Range" if patch_record.RANGE in patch else "Range (Auto)")
-    words = (name, factor, units.symbol(power, unit))
-    row.prop(patch, shown, text=" ".join(filter(None, words)), translate=False)
+    symbol = units.symbol(power, unit)
+    if factor:
+        symbol = f"{factor}{symbol[1:]}" if symbol.startswith("1/") else f"{factor} {symbol}"
+    row.prop(patch, shown, text=f"{name} {symbol}".rstrip(), translate=False)
     if patch_record.RECORD in patch:
         row.operator(TACTILE_OT_share_range.bl_idname, text="", icon="LINKED")
 

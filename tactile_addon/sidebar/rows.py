@@ -54,6 +54,7 @@ TIPS = {
     "Patches": "Number of touches that gave a patch",
     "No Patch": "Number of touches that gave no patch, by reason",
     "… in Doubt": "Number of these patches that are in doubt",
+    "… on Facets": "Number of these that have the curvature of facets, not of the shape",
     "… No Curvature": "Number of these vertices whose curvatures are unknown, beside edges and rims",
 }
 

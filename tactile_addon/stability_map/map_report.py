@@ -54,6 +54,7 @@ def map_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
         ("Spacing", units.say(record["spacing"], 1, unit)),
         ("Patches", str(record["patches"])),
         ("… in Doubt", str(record["in_doubt"])),
+        *([("… on Facets", str(record["few_facets"]))] if record.get("few_facets") else []),
         *([("No Patch", str(sum(count for _, count in refused)))] if refused else []),
         *((names[key], str(count)) for key, count in refused if count),
     ]

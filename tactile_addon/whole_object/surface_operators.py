@@ -14,6 +14,7 @@ from ..probes.operators import is_in_object_mode, make_active, polls, report_don
 from ..scene import patch_record
 from ..scene.attributes import DEVIATION
 from ..scene.mesh_data import own_mesh, values
+from ..touch import units
 from ..touch.arrays import read_array
 from ..touch.settings import draw_chosen
 from ..touch.types import Object, Outcome, Point
@@ -22,6 +23,7 @@ from .object_operator import EDGE
 from .object_report import deviation, object_summary
 
 SEEN = 0.4  # The view is as wide as this share of the object's size.
+CLAMPED = 0.99  # Edges shorter than this share of what was asked for are those that thin walls need.
 REACHED = 0.5  # Where less than this share of the largest deviation is the surface's, it is the object's.
 
 
@@ -127,7 +129,11 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
         report = self._touches.report() | {"source": obj[patch_record.ATLAS_RECORD]["source"]}
         whole_mesh.rewrite(obj, self._touches.whole, report)
         kept.keep(obj, self._touches)
-        return report_done(self, object_summary(obj[patch_record.ATLAS_RECORD].to_dict()))
+        record = obj[patch_record.ATLAS_RECORD].to_dict()
+        summary = object_summary(record)
+        if record["edge"] < CLAMPED * self.edge:
+            summary += f"; edges are {units.length(record['edge'])} long, as thin walls need"
+        return report_done(self, summary)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -14,7 +14,7 @@ from mathutils import Matrix
 from ... import core
 from ..scene import colors, patch_object, patch_record, undo
 from ..scene.attributes import COLOR, CORNERS, DEVIATION, HEIGHT_STD, NODE
-from ..scene.mesh_data import ABOVE, emission, fill, own_mesh, write
+from ..scene.mesh_data import ABOVE, draw_above, emission, fill, own_mesh, write
 from ..scene.shown import ALIKE, LEAST_BEND, least_gaussian_range, recolor, settle_on
 from ..scene.viewports import show_colors, show_size
 from ..touch.detached_mesh import DetachedMesh
@@ -25,8 +25,9 @@ SHARP = math.radians(30.0)  # Edges at which faces are turned by more are crease
 # While a patch is one of many, it is drawn with these rings, the last of which is its dark rim, and spokes.
 RINGS, SPOKES = (0.3, 0.65, 0.95, 1.0), 48
 RIM_COLOR = (0.02, 0.02, 0.02, 1.0)
-DRAWN_ABOVE = 5e-3  # It is drawn this share of the object's size above the mesh, in which it would lie,
-LAYER, LAYERS = 1e-3, 10  # and above patches that it overlaps by this share, up to so many times.
+GROWN_ABOVE = 3e-3  # It is drawn this share of the object's size above the mesh, in which it would lie,
+LAYER, LAYERS = 6e-4, 10  # and above patches that it overlaps by this share, up to so many times.
+DRAWN_ABOVE = 5e-3  # That of the whole surface, where it is not drawn in front.
 
 
 class GrowingPatches:
@@ -54,7 +55,7 @@ class GrowingPatches:
         if obj is None or not found:
             return
         for r, rim in zip(found, rims, strict=True):
-            above = DRAWN_ABOVE + LAYER * self._layer(r.frame, rim.max())
+            above = GROWN_ABOVE + LAYER * self._layer(r.frame, rim.max())
             self._patches.append(_disk(r, rim, above * self._size))
         points, k, curvedness = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
         count = 1 + SPOKES * len(RINGS)
@@ -114,7 +115,7 @@ def insert(scene: bpy.types.Scene, name: str, whole: WholeSurface, report: dict[
     """Adds a WholeSurface of the object with this name to the scene, and returns the new object."""
     mesh = bpy.data.meshes.new(f"{name} Surface")
     obj = bpy.data.objects.new(mesh.name, mesh)
-    obj.matrix_world, obj.show_in_front = Matrix.Translation(list(whole.origin)), True
+    obj.matrix_world = Matrix.Translation(list(whole.origin))
     patch_object.collection(scene).objects.link(obj)
     mesh.materials.append(emission("Tactile Surface", attribute=COLOR))
     rewrite(obj, whole, report | {"source": name})
@@ -139,5 +140,9 @@ def rewrite(obj: Object, whole: WholeSurface, report: dict[str, Any]) -> None:
     obj[patch_record.ATLAS_RECORD] = report | {"object": obj.name}
     obj[patch_record.GRAPH] = whole.graph
     obj[ABOVE] = DRAWN_ABOVE * float(np.ptp(found.vertices, axis=0).max())
+    # In front of the object the far side of an incomplete surface would fill what was not felt.
+    obj.show_in_front = not report.get("uncovered")
+    if not obj.show_in_front:
+        draw_above(obj, obj[ABOVE]).show_render = False
     recolor(obj)
     settle_on(obj)

@@ -200,3 +200,22 @@ def test_a_page_says_what_the_panel_says_and_its_scales_begin_where_values_do(em
     assert "Good: heights to ±" in text
     ends = re.findall(r'<text x="0" y="27" text-anchor="start">([^<]+)<', text)
     assert [end.startswith("-") for end in ends[:3]] == [True, False, True]
+
+
+def test_the_page_of_a_map_counts_touches_by_their_area_and_no_vertices(empty, extension):
+    """The vertices of a cylinder belong to its caps as well, which have no error."""
+    empty.ops.mesh.primitive_cylinder_add()
+    empty.ops.tactile.stability_map(target="Cylinder", spacing=0.5)
+    painted = empty.context.object
+    record = painted["tactile_map"].to_dict()
+    page = Page(extension.tactile_addon.report.map_page.map_page(painted))
+    rows = dict(extension.tactile_addon.stability_map.map_report.map_table_rows(record))
+    (row,) = [row for row in page.rows if row[0] == "± 1 standard deviation"]
+    assert row[1] == rows["median standard deviation"]
+
+
+def test_only_all_of_a_surface_is_100_percent(extension):
+    parts = extension.tactile_addon.report.parts
+    values, weights = np.array([0.0, 1.0]), np.array([9999.0, 1.0])
+    page = Page(parts.bands(values, weights, 0.5, ("mm", 1.0), [("less", 0.9), ("all", 1.5)]))
+    assert (band(page, "less"), band(page, "all")) == (99.9, 100.0)

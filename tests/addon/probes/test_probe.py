@@ -588,6 +588,7 @@ def test_deleting_takes_all_of_the_probe_and_nothing_else(empty, ball, active):
     select(empty, empty.data.objects[f"{active}.001"])
     assert empty.ops.tactile.delete() == {"FINISHED"}
     assert datablocks(empty) == others
+    assert empty.context.object == empty.data.objects["Sphere"]  # The next touch is about it.
     select(empty, empty.data.objects[active])
     assert empty.ops.tactile.delete() == {"FINISHED"}
     assert names(empty) == SET[:1]

@@ -40,7 +40,7 @@ def test_another_edge_length_needs_no_touches(empty, surface):
 
 
 @pytest.mark.long
-def test_where_a_wall_is_thin_the_report_has_the_length_of_edges_that_were_made(empty, extension):
+def test_where_a_wall_is_thin_the_report_has_the_length_of_edges_that_were_made(empty, extension, capfd):
     empty.ops.mesh.primitive_cube_add()
     empty.context.object.scale.z = 0.05
     surface, before = made(empty.ops.tactile.touch_all_over, "tactile_object")
@@ -49,6 +49,8 @@ def test_where_a_wall_is_thin_the_report_has_the_length_of_edges_that_were_made(
     assert record["edge"] == before["edge"] == pytest.approx(0.25 * 0.1, rel=0.1)
     rows = dict(extension.tactile_addon.whole_object.object_report.object_rows(record))
     assert rows["Edge Length"].endswith(" cm")
+    assert f"; edges are {rows['Edge Length']} long, as thin walls need" in capfd.readouterr().out
+    assert surface.show_in_front and not surface.modifiers
 
 
 @pytest.mark.long

@@ -131,6 +131,9 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball, extension):
     rows = dict(extension.tactile_addon.whole_object.object_report.object_rows(record))
     places = f"{record['uncovered']} places"
     assert (rows["Surface"], rows["Goes On At"]) == ("Incomplete", places)
+    # Its far side does not show through where nothing was felt.
+    assert not surface.show_in_front
+    assert surface.modifiers["Above the Mesh"].strength > 0.0
     # What was not felt is where the mesh is farthest from the surface.
     assert record["deviation_max"] > 1.0
     assert np.linalg.norm(record["deviation_place"]) == pytest.approx(2.0, abs=0.01)
