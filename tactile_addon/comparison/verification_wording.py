@@ -13,12 +13,12 @@ from ..touch.touch_report import TouchReport
 from ..touch.units import Unit
 from ..touch.wording import SPREAD, cell
 
-# The results of core.verify, in the order of a table.
+# The results of core.verify, and the largest distance of the patch from the mesh, in the order of a table.
 VERIFIED = (
     *("vertices", *(f"vertex_distance_{key}" for key in SPREAD)),
     *("contacts", *(f"contact_distance_{key}" for key in SPREAD), "fit_error"),
     *("extra_contours", "extra_points", "extra_fit_error"),
-    *("total_absolute_curvature", "overlap"),
+    *("total_absolute_curvature", "overlap", "patch_distance_max"),
 )
 
 
@@ -76,6 +76,7 @@ def verification_rows(found: Mapping[str, Any], unit: Unit) -> list[tuple[str, s
         (f"Error on {found['extra_contours']} More", _length(found, "extra_fit_error", unit)),
         ("Total |K|", f"{found['total_absolute_curvature']:.3g}"),
         ("Overlap", f"{100.0 * found['overlap']:.0f} %"),
+        ("Patch to Mesh", _length(found, "patch_distance_max", unit)),
     ]
 
 

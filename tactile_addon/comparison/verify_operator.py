@@ -87,7 +87,8 @@ class Verification:
         mesh_data.write(patch.data, attributes.DEVIATION, deviations)
         shown.recolor(patch)
         shown.share_range(patch)
-        record["verification"] = {"target": self.target, **self._found}
+        farthest = float(np.abs(deviations).max())
+        record["verification"] = {"target": self.target, **self._found, "patch_distance_max": farthest}
         height = self._error.height
         if height is not None:
             record["height_error"] = height

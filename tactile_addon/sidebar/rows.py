@@ -42,6 +42,7 @@ TIPS = {
     "Error on … More": "The same for more contours, which are felt on the mesh between the sampling planes",
     "Total |K|": "Absolute Gaussian curvature summed over the patch: 0 where it is flat or rolled",
     "Overlap": "Share of the patch's area that has mesh below it",
+    "Patch to Mesh": "Largest distance of a vertex of the patch from the mesh, as the colors show it",
     "Touches": "Number of touches that the object took",
     "Surface": "Closed: felt all round; Open: the object ends there; Incomplete: touches could go on",
     "Goes On At": "Number of places where nothing was felt yet, although the object goes on there",

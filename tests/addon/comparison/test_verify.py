@@ -166,7 +166,10 @@ def test_the_scenes_unit_is_the_panels(empty, patch, extension):
     assert [row[0] for row in rows] == ["Mean", "Median", "Maximum", "RMS"]
     assert rows[0][1] == f"{found['vertex_distance_mean']:.3g}"
     assert points == ("Points", str(found["vertices"]), "60")
-    assert dict(addon.comparison.verification_wording.verification_rows(found, unit))["Overlap"] == "100 %"
+    rows = dict(addon.comparison.verification_wording.verification_rows(found, unit))
+    assert rows["Overlap"] == "100 %"
+    farthest = np.abs(values(patch.data, "deviation")).max()
+    assert rows["Patch to Mesh"] == addon.touch.units.say(farthest, 1, unit)
 
 
 def test_half_covered_and_nothing_below(empty, patch, capfd):
