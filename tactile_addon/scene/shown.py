@@ -14,6 +14,7 @@ from ..touch.touch_report import TouchReport
 from ..touch.types import Array, Object
 from . import colors
 from .attributes import COLOR, CURVATURE_STD, CURVATURES, DEVIATION, GAUSSIAN_STD, POSITION
+from .contour_mesh import HIGHEST
 from .family import all_objects
 from .mesh_data import ABOVE, own_mesh, values
 from .patch_record import (
@@ -37,6 +38,7 @@ LAYER = "tactile_layer"  # A patch's number among those that overlap; 0 is the l
 ABOVE_OTHERS = "Above Other Patches"  # The modifier that draws it above those with lower numbers,
 APART = 2.0  # by this multiple of the deviations of the heights of both,
 LEAST_LAYER, MOST_LAYER = 3e-3, 3e-2  # and by no less and no more than these shares of its radius.
+HIDDEN = 1.2 * HIGHEST  # A patch is so far above another, in radii of that, that its contours do not show.
 ALIKE = 0.5  # Patches overlap only if the cosine between their normals is more.
 
 
@@ -169,7 +171,7 @@ def _layer(upper: Object, lower: Object) -> float:
     """How far above another a patch is drawn: by more than both may be off, as two in one place flicker."""
     # Eevee draws each of them above the mesh as well, the lower one perhaps by more.
     further = max(lower.get(ABOVE, 0.0) - upper.get(ABOVE, 0.0), 0.0)
-    return _apart(upper[RECORD], lower[RECORD]) + further
+    return max(_apart(upper[RECORD], lower[RECORD]), HIDDEN * lower[RECORD]["radius"]) + further
 
 
 def _height(patch: Object) -> float:

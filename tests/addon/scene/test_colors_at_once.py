@@ -86,6 +86,11 @@ def test_patches_over_each_other_do_not_flicker(empty, ball):
     lifted = (positions(shown) - positions(second.data))[:, 2]
     assert (lifted > 1e-3 * second["tactile"]["radius"]).all()
     assert not second.modifiers[0].show_render
+    # The contours of the lower one do not show through it.
+    (lines,) = first.children
+    tips = positions(lines.data)[values(lines.data, "contact") >= 0].reshape(-1, 6, 3)
+    heights = np.ptp(tips[:, :, 2], axis=1) / 2.0
+    assert heights.max() < second.modifiers[0].strength
     empty.data.objects.remove(first)
     third = touch(empty, (0, 0.1, 0.995))
     assert len(third.modifiers) == 0
