@@ -32,24 +32,21 @@ class MeshError(NamedTuple):
 
 def mesh_error(r: Reconstruction, surface: Surface) -> MeshError:
     """How far the surface is off the patch, by rays at the Gauss points of the domain."""
-    return mean_error(r, node_offs(r, surface, side_of(r, surface)))
+    return mean_error(r, offs_at(r, surface, r.domain.nodes[0], side_of(r, surface)))
 
 
 def mean_error(r: Reconstruction, offs: Array) -> MeshError:
-    """The error of the distances `offs` at the nodes of the domain, as `node_offs` has them."""
+    """The error of the distances `offs` at the nodes of the domain, as `offs_at` has them."""
     _, weights = r.domain.nodes
     met = ~np.isnan(offs)
     height = float(np.average(offs[met], weights=weights[met])) if met.any() else None
     return MeshError(height, float(weights[~met].sum()))
 
 
-def node_offs(r: Reconstruction, surface: Surface, side: float) -> Array:
-    """The distance in height of patch and surface at each node of the domain (n,); NaN if there is none."""
-    points, _ = r.domain.nodes
-    heights = r.height(points[:, 0], points[:, 1])
-    up = vector_of(r.frame.axes[:, 2])
-    starts = r.frame.to_world(np.column_stack([points, heights])).tolist()
-    offs = (layer_off(surface, vector_of(start), up, r.radius, side) for start in starts)
+def offs_at(r: Reconstruction, surface: Surface, points: Array, side: float) -> Array:
+    """The distance in height of patch and surface at local points (n, 2); NaN where there is no surface."""
+    feet, up = r.frame.to_world(np.column_stack([points, r.height(*points.T)])), vector_of(r.frame.axes[:, 2])
+    offs = (layer_off(surface, vector_of(foot), up, r.radius, side) for foot in feet.tolist())
     return np.array([math.nan if off is None else off for off in offs])
 
 

@@ -14,7 +14,7 @@ from ..contours.finger import Surface, contact_of
 from ..patch.domain import GAUSS_ALONG, SAME_END, Domain
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import CONTRADICTING, Taps
-from .mesh_error import layer_off, mean_error, node_offs, side_of
+from .mesh_error import mean_error, offs_at, side_of
 
 # benchmarks.real --only taps chooses these. Between the ends of two curves there are four taps at NEAR_RIM of
 # the way to the boundary, and two at WITHIN.
@@ -53,13 +53,10 @@ def tapped(surface: Surface, r: Reconstruction) -> Tapped:
     offs = np.empty(len(where))
     felt = np.array([contact_of(hit, 1.0)[0] for hit in hits if hit is not None]).reshape(-1, 3)
     offs[met] = np.abs((felt - feet[met]) @ up)
-    side, vertical = side_of(r, surface), vector_of(up)
-    offs[~met] = [
-        math.nan if off is None else off
-        for off in (layer_off(surface, vector_of(foot), vertical, r.radius, side) for foot in feet[~met])
-    ]
+    side = side_of(r, surface)
+    offs[~met] = offs_at(r, surface, where[~met], side)
     missed, offs = np.isnan(offs), np.nan_to_num(offs)
-    nodes = node_offs(r, surface, side)
+    nodes = offs_at(r, surface, r.domain.nodes[0], side)
     within, missing = mean_error(r, nodes)
     within = within or 0.0
     contradicts = (
