@@ -40,6 +40,7 @@ LEAST_DEGREE = 2  # No patch has a lower degree.
 DISK = 0.95  # A patch of lower degree is fitted over a disk of this radius: not all curves end at L.
 QUARTIC_SHARE = 0.6  # Share of the radius (benchmarks.real); 0.8 takes in what has no bearing on the point.
 ALIKE = 0.05  # Curvatures that differ by less make no directions, as in the rule of benchmarks.stability.
+ALIKE_SHARE = 0.1  # Nor do those of what may be a sphere, if their deviation is less than this share of them.
 CONFIDENCE = 0.95  # Directions are judged with this probability.
 ROUND = 12.59  # The quantile at CONFIDENCE of chi squared with six degrees of freedom.
 INVISIBLE = 0.9  # A direction of which this share of the prior's variance is left is invisible.
@@ -243,9 +244,11 @@ class SurfacePosterior(HeightField):
     def is_round(self) -> bool:
         """Whether the surface may be a sphere or a plane, judged by its terms to degree 3 with CONFIDENCE.
 
-        Then there are no principal directions. It is False if curvatures are not known to ALIKE.
+        Then there are no principal directions. It is False if curvatures are not known to ALIKE, or to
+        ALIKE_SHARE of their mean.
         """
-        if self.curvature_std() > ALIKE:
+        xx, _, yy = self.polynomial[2:FREE].tolist()
+        if self.curvature_std() > max(ALIKE, ALIKE_SHARE * abs(xx + yy)):
             return False
         apart = _UNLIKE_SPHERE @ self.polynomial
         apart_covariance = _UNLIKE_SPHERE @ self.covariance @ _UNLIKE_SPHERE.T

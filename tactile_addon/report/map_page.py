@@ -34,7 +34,7 @@ def map_page(painted: Object) -> str:
             ),
         ),
         *_errors(painted, record, unit),
-        *parts.ending(map_table_rows(record), record),
+        *parts.ending(map_table_rows(record), record, unit),
     ]
     return page.page(f"{painted.name}: a stability map of {record['source']}", sections)
 

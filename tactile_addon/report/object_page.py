@@ -34,7 +34,7 @@ def object_page(obj: Object) -> str:
         page.verdict(f"{object_summary(record)}. {record['message']}", record["status"] == "ok"),
         _pictures(obj.data, unit_of(record), "deviation" if was_touched else "height_std"),
         *(_deviations(obj.data, record) if was_touched else ()),
-        *parts.ending(object_table_rows(record), record),
+        *parts.ending(object_table_rows(record), record, unit_of(record)),
     ]
     return page.page(f"{obj.name}: the surface of a whole object", sections)
 

@@ -59,11 +59,11 @@ def bands(
     return page.table(rows, ("band", "", "within it", "expected, if normal"))
 
 
-def ending(rows: Iterable[tuple[str, str]], record: Mapping[str, Any]) -> list[str]:
+def ending(rows: Iterable[tuple[str, str]], record: Mapping[str, Any], unit: Unit) -> list[str]:
     """The sections at the end of a page: what was found, as rows, and how."""
     return [
         page.section("What was found", page.table(rows)),
-        page.section("Settings", page.table(_settings(record))),
+        page.section("Settings", page.table(_settings(record, unit))),
         page.section("Versions", page.table(_versions())),
     ]
 
@@ -73,18 +73,18 @@ def label(power: int, unit: Unit) -> Callable[[float], str]:
     return lambda value: units.say(value, power, unit) if value else "0"
 
 
-def _settings(record: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _settings(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     """(label, value) of the settings that a record has."""
     names = ("method", "degree", "tolerance", "most", "spacing", "extent", "step", "noise", "seed")
-    rows = [(WORDS.get(name, name), _setting(name, record[name])) for name in names if name in record]
+    rows = [(WORDS.get(name, name), _setting(name, record[name], unit)) for name in names if name in record]
     planes = [f"{azimuth:.0f}° leaning {tilt:.0f}°" for azimuth, tilt in record.get("planes", ())]
     return [*rows, *([("planes", ", ".join(planes))] if planes else [])]
 
 
-def _setting(name: str, value: Any) -> str:
+def _setting(name: str, value: Any, unit: Unit) -> str:
     if name in CHOSEN and not value:
         return "auto"
-    return units.length(value) if name in LENGTHS else str(value)
+    return units.say(value, 1, unit) if name in LENGTHS else str(value)
 
 
 def _versions() -> list[tuple[str, str]]:

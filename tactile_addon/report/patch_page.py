@@ -38,7 +38,7 @@ def patch_page(patch: Object, r: core.Reconstruction) -> str:
         page.section("Pictures", *_pictures(patch, r, record, unit)),
         page.section("Deviations", parts.spread(off, weights, unit, words)),
         page.section("Tolerance bands", bands),
-        *parts.ending(readable_rows(record), record),
+        *parts.ending(readable_rows(record), record, unit),
     ]
     return page.page(f"{patch.name}: a patch of {record['source']}", sections)
 

@@ -30,7 +30,7 @@ def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
             f"{record['source']}, at {record['touched']} of {many(record['points'], 'point', 'points')}",
         ),
         ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
-        ("refused", ", ".join(f"{key} {count}" for key, count in record["refused"].items())),
+        ("refused", ", ".join(_refused(record)) or "none"),
         ("fit", f"{record['method']}, degree {record['degree']}"),
         (", ".join(names), ", ".join(lengths)),
         *((f"median {title.lower()}", value) for _, title, value in _medians(record, unit)),
@@ -41,9 +41,13 @@ def map_summary(record: Mapping[str, Any]) -> str:
     """A sentence on what a stability map has found."""
     patches = many(record["patches"], "patch", "patches")
     words = [f"{patches} at {many(record['touched'], 'point', 'points')}, {record['in_doubt']} in doubt"]
+    return "; ".join([*words, *(f"refused: {refused}" for refused in _refused(record))])
+
+
+def _refused(record: Mapping[str, Any]) -> list[str]:
+    """How many points were refused, for each reason."""
     names = {key: name for key, name, _ in REASONS}
-    words += [f"{count} refused: {names[key]}" for key, count in record["refused"].items() if count]
-    return "; ".join(words)
+    return [f"{count} {names[key]}" for key, count in record["refused"].items() if count]
 
 
 def map_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:

@@ -26,7 +26,7 @@ def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
     contacts = _measured_contacts(report) if "curves" in report else _tracked(report)
     return [
         ("touched", report["source"]),
-        ("status", f"{report['status']}: {report['message']}"),
+        ("verdict", f"{verdict(report, unit)}. {report['message']}"),
         ("fit", f"{report['method']}, degree {report['degree']}"),
         ("contacts", contacts),
         *_lengths(report, unit),
@@ -39,7 +39,7 @@ def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
         ("mean curvature", _measured(report, "mean_curvature", -1, unit)),
         ("shape index", f"{report['shape_index']:.3f}"),
         ("curvedness", say(report["curvedness"], -1, unit)),
-        ("residual", _shared(report, "residual", unit)),
+        ("Gaussian process", _amplitude(report, unit)),
         ("fit error (6)", _shared(report, "fit_error", unit)),
         ("standard deviation of the height", _shared(report, "height_std", unit)),
         ("mesh to patch", _verification(report, unit)),
@@ -192,6 +192,11 @@ def vector(v: Iterable[float]) -> str:
 def _measured(report: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
     """A value of the report, which is in length^power, in words with its standard deviation."""
     return say(report[key], power, unit, report[f"{key}_std"])
+
+
+def _amplitude(report: TouchReport, unit: Unit) -> str:
+    """The amplitude of the process that is added to the polynomial, in words."""
+    return f"amplitude {_shared(report, 'residual', unit)}" if report["residual"] else "none"
 
 
 def _shared(report: Mapping[str, Any], key: str, unit: Unit) -> str:

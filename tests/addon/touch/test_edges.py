@@ -22,7 +22,8 @@ def cube(empty):
 
 
 def report_of(bpy, location, **arguments):
-    assert bpy.ops.tactile.pick(target="Cube", location=location, new=True, **arguments) == {"FINISHED"}
+    arguments = {"target": "Cube", "new": True} | arguments
+    assert bpy.ops.tactile.pick(location=location, **arguments) == {"FINISHED"}
     (patch,) = bpy.context.object.children
     return patch["tactile"].to_dict()
 
@@ -107,6 +108,14 @@ def test_a_plane_gets_no_advice_about_directions_that_it_does_not_have(empty, cu
     report = report_of(empty, cube.matrix_world @ Vector(location), extent=extent)
     assert report["status"] == "ok"
     assert OFF not in report["message"]
+
+
+@pytest.mark.parametrize("place", [(0.606, -0.608, 0.505), (0.7039, -0.7032, 0.0505)])
+def test_a_ball_of_facets_gets_no_advice_about_directions_that_it_does_not_have(empty, place):
+    empty.ops.mesh.primitive_uv_sphere_add()
+    report = report_of(empty, place, target="Sphere")
+    assert report["status"] == "ok"
+    assert "The two curvatures are equal within their error" in report["message"]
 
 
 @pytest.fixture
