@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ..scene import patch_record
-from ..scene.attributes import HEIGHT_STD, MAP_COLOR, REASON, TOUCH
+from ..scene.attributes import HEIGHT_STD, MAP_COLOR, REASON
 from ..stability_map import map_object
 from ..stability_map.map_report import map_summary, map_table_rows
 from ..stability_map.stability import NOTHING
@@ -53,13 +53,8 @@ def _legend(painted: Object, record: Mapping[str, Any], unit: Unit) -> str:
 
 def _errors(painted: Object, record: Mapping[str, Any], unit: Unit) -> list[str]:
     """The sections on errors, in which each touch counts by the area that has its color."""
-    mesh, found = painted.data, painted[map_object.VALUES]
-    errors, stds = (np.array(found[name]) for name in ("error", HEIGHT_STD))
-    corners = read_array(mesh.polygons, "loop_total", dtype=np.int32)
-    areas = np.repeat(read_array(mesh.polygons, "area") / corners, corners)
-    weights = np.bincount(
-        read_array(mesh.attributes[TOUCH].data, "value", dtype=np.int32), areas, len(errors)
-    )
+    found = painted[map_object.VALUES]
+    errors, stds, weights = (np.array(found[name]) for name in ("error", HEIGHT_STD, map_object.AREA))
     counts = (weights > 0.0) & (errors != NOTHING)
     if not counts.any():
         return []

@@ -22,7 +22,8 @@ from .stability import NOTHING, REASON_KEYS, REASONS, StabilityMap
 
 SHADES = 256
 PLACES = "tactile_places"  # The points that were touched, in the axes of the map: three numbers each,
-VALUES = "tactile_values"  # and what was found there, by the names of the attributes.
+VALUES = "tactile_values"  # and what was found there, by the names of the attributes, with
+AREA = "area"  # the area in the world that has the color of each.
 # The map is shown this share of the object's size above the mesh. With less it flickers if it is 20000 clip
 # starts away, as a scan in mm is.
 SHOWN_ABOVE = 5e-3
@@ -46,7 +47,8 @@ MAP_QUANTITIES = [
     (REASON, "Reason", "Whether there is a patch, and why there is none", 0),
 ]
 LOGARITHMIC = ("condition_number",)  # These have a logarithmic scale from 1.
-# The range reaches at least to where a typical patch would be in doubt: this multiple of that quantity.
+# The range reaches at least to where the typical patch, that of the median by area, would be in doubt: this
+# multiple of that quantity.
 DOUBTFUL = {"error": (core.CONTRADICTING, HEIGHT_STD), HEIGHT_STD: (core.DOUBTFUL_STD, "reach")}
 REVERSED = ("reach",)  # Of these much is good, so that red is little: red is bad on every map.
 MAP_POWERS = {name: power for name, _, _, power in MAP_QUANTITIES}
@@ -71,13 +73,13 @@ def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Ob
     # It would lie in the mesh it describes, so it is shown a little above it. It is not shown in front,
     # because patches that lie in it are.
     draw_above(painted, SHOWN_ABOVE * math.dist(painted.bound_box[0], painted.bound_box[6]))
-    _paint(mesh, touched)
+    areas = _paint(mesh, touched)
     places = np.array(touched.places[: touched.done]).reshape(-1, 3) + touched.surface.origin
     painted[PLACES] = _applied(np.linalg.inv(_array(painted.matrix_basis)), places).ravel().tolist()
     mesh.materials.clear()
     mesh.materials.append(emission("Tactile Stability", attribute=MAP_COLOR))
     painted[VALUES] = {name: touched.measures[name].tolist() for name in MEASURES}
-    painted[VALUES][REASON] = touched.reason.tolist()
+    painted[VALUES].update({REASON: touched.reason.tolist(), AREA: areas.tolist()})
     painted[patch_record.MAP_RECORD] = touched.report() | {"source": obj.name, "painted": painted.name}
     patch_object.collection(context.scene).objects.link(painted)
     recolor(painted)
@@ -85,20 +87,19 @@ def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Ob
     return painted
 
 
-def _paint(mesh: bpy.types.Mesh, touched: StabilityMap) -> None:
-    """Gives each vertex the values of its touch, and each corner of a face the touch whose color it has.
+def _paint(mesh: bpy.types.Mesh, touched: StabilityMap) -> Array:
+    """Gives each vertex the values of its touch, and each face the color of its own.
 
-    That is the touch in the face, if there is one: narrow faces may share all vertices with wide ones.
+    It returns the area (n,) that has the color of each touch.
     """
     for name in MEASURES:
         write(mesh, name, touched.measures[name][touched.touch_of])
     write(mesh, REASON, touched.reason[touched.touch_of])
-    corners = read_array(mesh.loops, "vertex_index", dtype=np.int32)
-    within = np.repeat(touched.touch_in, read_array(mesh.polygons, "loop_total", dtype=np.int32))
-    touch = np.where(within < 0, touched.touch_of[corners], within)
+    touch = np.repeat(touched.touch_in, read_array(mesh.polygons, "loop_total", dtype=np.int32))
     write(mesh, TOUCH, touch.astype(np.int32), CORNERS)
     write(mesh, MAP_COLOR, np.ones((len(touch), 4)), CORNERS)
     mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = MAP_COLOR
+    return np.bincount(touched.touch_in, touched.areas, len(touched.reason))
 
 
 def recolor(painted: Object) -> None:
@@ -137,8 +138,10 @@ def _least_range(painted: Object, shown: str) -> float:
     least = LEAST_RANGE * painted[patch_record.MAP_RECORD]["spacing"]
     times, other = DOUBTFUL.get(shown, (0.0, shown))
     values = np.array(painted[VALUES][other])
-    known = values[values != NOTHING]
-    return max(least, times * float(np.median(known))) if len(known) else least
+    order = np.argsort(values)
+    areas = np.cumsum(np.where(values == NOTHING, 0.0, painted[VALUES][AREA])[order])
+    median = float(values[order[np.searchsorted(areas, 0.5 * areas[-1])]])
+    return max(least, times * median) if areas[-1] else least
 
 
 def swatches(painted: Object) -> list[tuple[str, tuple[float, ...]]]:

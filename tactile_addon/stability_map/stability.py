@@ -67,9 +67,9 @@ class StabilityMap:
     places : n arrays (3,), the places to touch as the surface has them, in random order
     done : how many of these have been touched; few_facets : how many patches follow facets
     measures, reason : (n,), what was found by each touch; the fields of `measures` are MEASURES
-    touch_of : index of the touch whose values each vertex of the mesh has, once the steps are done: that of
-        the largest touched face at it, or else the nearest
-    touch_in : index of the touch in each face, or -1
+    areas : those of the faces
+    touch_in : index of the touch nearest to the middle of each face, once the steps are done
+    touch_of : that of the largest face at each vertex, or the nearest to a vertex without faces
     """
 
     def __init__(
@@ -108,17 +108,15 @@ class StabilityMap:
         self._rng = np.random.default_rng(seed)
         _rehearse(planes, fit, **self._glance)
         self.places: list[Array] = []
-        self._touched: list[int] = []  # the faces of these
         self.done = self.few_facets = 0
 
     def steps(self) -> Iterator[None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
-        middles, self._areas = _faces(self.surface)
+        self._middles, self.areas = _faces(self.surface)
         yield
-        for index in core.spaced(middles, self.spacing, self._rng):
+        for index in core.spaced(self._middles, self.spacing, self._rng):
             if index is not None:
-                self.places.append(middles[index])
-                self._touched.append(index)
+                self.places.append(self._middles[index])
             yield
         count = len(self.places)
         self.measures = np.full(count, NOTHING, dtype=[(name, float) for name in MEASURES])
@@ -132,22 +130,21 @@ class StabilityMap:
         yield from self.spread()
 
     def spread(self) -> Iterator[None]:
-        """Finds the touch for each vertex among those that are done, as a generator like `steps`."""
+        """Finds the touch for each face and vertex among those that are done, as a generator like `steps`."""
         from scipy.spatial import cKDTree
 
-        points = self.surface.points
         tree = cKDTree(self.places[: self.done])
-        self.touch_of = np.empty(len(points), dtype=np.intp)
-        for start in range(0, len(points), NEAREST_AT_ONCE):
+        self.touch_in = np.empty(len(self._middles), dtype=np.intp)
+        for start in range(0, len(self._middles), NEAREST_AT_ONCE):
             some = slice(start, start + NEAREST_AT_ONCE)
-            self.touch_of[some] = tree.query(points[some])[1]
+            self.touch_in[some] = tree.query(self._middles[some])[1]
             yield
         # Touches in narrow faces would color wide ones that share all vertices with them, as on a plate.
-        touch = self.touch_in = np.full(len(self._areas), -1)
-        touch[self._touched[: self.done]] = np.arange(self.done)
-        order = np.argsort(self._areas[self.surface.owners], kind="stable")
-        order = order[touch[self.surface.owners[order]] >= 0]
-        self.touch_of[self.surface.triangles[order].ravel()] = np.repeat(touch[self.surface.owners[order]], 3)
+        owners, self.touch_of = self.surface.owners, np.full(len(self.surface.points), -1)
+        order = np.argsort(self.areas[owners], kind="stable")
+        self.touch_of[self.surface.triangles[order].ravel()] = np.repeat(self.touch_in[owners[order]], 3)
+        loose = self.touch_of < 0
+        self.touch_of[loose] = tree.query(self.surface.points[loose])[1]
 
     def _touch(self, numbers: Sequence[int]) -> Iterator[None]:
         """Makes the touches with these numbers, as a generator like `steps`."""

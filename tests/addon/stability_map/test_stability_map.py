@@ -381,11 +381,38 @@ def test_a_map_is_red_where_patches_are_about_in_doubt(empty):
     painted, record = stability_map(empty, spacing=0.5)
     assert record["in_doubt"] == 0
     found = {name: np.array(painted["tactile_values"][name]) for name in ("error", "height_std", "reach")}
-    good = found["error"] >= 0.0
+    wall = found["height_std"] > 0.5 * found["height_std"].max()
+    assert np.count_nonzero(wall) == len(wall) - 2  # The two are its lids.
     painted.tactile_map_colors = "error"
-    assert painted["tactile_map"]["color_limit"] >= 2.0 * np.median(found["height_std"][good])
+    assert painted["tactile_map"]["color_limit"] >= 2.0 * found["height_std"][wall].min()
     painted.tactile_map_colors = "height_std"
-    assert painted["tactile_map"]["color_limit"] >= 0.02 * np.median(found["reach"][good])
+    assert painted["tactile_map"]["color_limit"] >= 0.02 * found["reach"][wall].min()
+
+
+def test_a_face_that_is_not_touched_has_the_color_of_the_nearest_face(empty):
+    """Where few faces of a wall are touched, all its vertices are those of its wide lids, too."""
+    empty.ops.mesh.primitive_cylinder_add()
+    painted, _ = stability_map(empty, spacing=0.5)
+    std = np.array(painted["tactile_values"]["height_std"])
+    touch = np.empty(len(painted.data.loops), dtype=np.int32)
+    painted.data.attributes["touch"].data.foreach_get("value", touch)
+    for polygon in painted.data.polygons:
+        is_wall = std[touch[polygon.loop_start]] > 0.5 * std.max()
+        assert is_wall == (abs(polygon.normal.z) < 0.5)
+
+
+def test_a_map_of_few_wide_faces_between_many_narrow_ones_has_the_range_of_the_wide_ones(empty):
+    empty.ops.mesh.primitive_cube_add()
+    empty.context.object.scale = (1.0, 2.0, 0.5)
+    bevel = empty.context.object.modifiers.new("Bevel", "BEVEL")
+    bevel.width, bevel.segments = 0.1, 3
+    painted, record = stability_map(empty, spacing=0.1)
+    found = {name: np.array(painted["tactile_values"][name]) for name in ("area", "error", "height_std")}
+    wide = found["area"] > 0.5
+    assert np.count_nonzero(wide) == 6 < 0.2 * record["patches"]
+    assert found["area"].sum() == pytest.approx(28.0, rel=0.1)  # that of the cube in the world
+    assert painted["tactile_map"]["color_limit"] >= 2.0 * found["height_std"][wide].min()
+    assert found["error"][wide].max() < 0.2 * painted["tactile_map"]["color_limit"]
 
 
 def test_faces_of_no_area_are_nothing_to_feel(empty):
