@@ -15,7 +15,7 @@ from ..reconstruction.result import Reconstruction
 
 # benchmarks.facets shows how far curvatures are off with these.
 OTHER = 0.27  # Curvatures are those of a facet if they are off by this share of the larger one of the shape,
-SPAN = 2.0  # which follows from how facets turn within this many widths of the point.
+SPAN = 2.0  # which follows from how facets turn within this many widths, and the radius of curvature.
 # Edges between these angles stand for a smooth bend,
 DISTINCT_COSINE, SMOOTH_COSINE = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))
 # if both facets have this share of the wider one's width, and of the radius; else one is a fillet.
@@ -49,7 +49,9 @@ def has_few_facets(
     if width < MIN_WIDTH_RATIO * r.radius:  # The mesh is fine.
         return False
     points = np.vstack([contour.points for contour in r.contours]) - r.frame.origin
-    points = r.frame.origin + SPAN * width / r.radius * points
+    # Where facets narrow, as near the tip of a cone, their widths would reach around it and beyond the tip.
+    reach = 1.0 / max(abs(r.k1), abs(r.k2), 1.0 / (SPAN * width))
+    points = r.frame.origin + reach / r.radius * points
     faces = [face_near(point) for point in points]
     around, wide = map(shape, set(faces)), max(width, r.radius)
     if not any(_is_smooth(facet, wide, lambda at: shape(face_near(at))) for facet in around):

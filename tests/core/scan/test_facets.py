@@ -156,6 +156,25 @@ def test_the_curvature_of_a_ball_is_right_or_said_to_be_that_of_facets():
     assert wrong <= 2
 
 
+def cone(segments):
+    """Blender's cone, of radius 1 and height 2, around the origin."""
+    angles = 2.0 * math.pi / segments * np.arange(segments + 1)
+    rim = np.column_stack([np.cos(angles), np.sin(angles), np.full(segments + 1, -1.0)])
+    wall = [((0.0, 0.0, 1.0), a, b) for a, b in itertools.pairwise(rim)]
+    return Mesh(wall + [((0.0, 0.0, -1.0), b, a) for a, b in itertools.pairwise(rim)])
+
+
+@pytest.mark.parametrize("z", [0.85, 0.9, 0.95])
+def test_facets_that_narrow_toward_the_tip_of_a_cone_are_fine_there(z):
+    mesh = cone(32)
+    along = np.array([math.cos(0.1), math.sin(0.1), 0.0])
+    point, normal = mesh.ray_cast(tuple(2.0 * along + (0.0, 0.0, z)), tuple(-along), 3.0)
+    r = core.explore(mesh, point, normal).result
+    exact = np.array([-4.0 / math.sqrt(5.0) / (1.0 - z), 0.0])
+    assert np.abs(np.sort([r.k1, r.k2]) - exact).max() < 0.15 * -exact[0]
+    assert not core.has_few_facets(r, mesh.face_near, mesh.corners_of)
+
+
 def test_a_flat_face_between_sharp_edges_is_the_shape():
     assert not has_few(Prism([(-1.0, -1.0), (-0.99, 0.0), (0.99, 0.0), (1.0, -1.0)]), 0.5)
     assert not has_few(Prism([(-1.0, 0.0), (-0.3, 0.0), (0.2, 0.0), (1.0, 0.0)]), 0.5)
