@@ -25,6 +25,7 @@ from .contours.contour import (
     WHERE,
     Contour,
     SamplingPlane,
+    stops_at,
 )
 from .contours.finger import Surface
 from .contours.local_geometry import DegenerateCurvesError, Frame
@@ -112,6 +113,7 @@ __all__ = [
     "shortest_edge",
     "spaced",
     "spaced_count",
+    "stops_at",
     "suggest_plane",
     "to_dict",
     "touch_all_over",

@@ -3,7 +3,7 @@
 """Sampling planes and the contours in them (paper, section II), and vectors as Python floats."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -31,7 +31,8 @@ WHERE = {  # The stops in words.
     NOT_MONGE: "where the surface turns away",
     UNEXPLAINED: "where the patch could no longer be trusted",
 }
-SURFACE_ENDS = (NO_CONTACT, CREASE)  # The surface ends at these stops.
+SURFACE_ENDS = (NO_CONTACT, CREASE)  # The surface ends at these stops,
+SURFACE_STOPS = (*SURFACE_ENDS, NOT_MONGE)  # and itself ends a curve at these.
 
 Vector = tuple[float, float, float]
 
@@ -202,6 +203,16 @@ def consistently_oriented(normals: Array, order: NDArray[np.intp], starts: NDArr
     group[order] = np.searchsorted(starts, np.arange(len(order)), side="right") - 1
     side = np.einsum("ni,ni->n", unit, unit[order[starts]][group])
     return np.where(side[:, None] < 0.0, -unit, unit)
+
+
+def stops_at(contours: Iterable[Contour], point: ArrayLike, reach: float = 0.0) -> list[str]:
+    """Why half curves end within the length `reach` of a point (3,) already: it is at a crease or an edge."""
+    return [
+        stop
+        for contour in contours
+        for end, stop in zip(contour.points[[0, -1]], contour.stops or (), strict=False)
+        if stop in SURFACE_STOPS and np.linalg.norm(end - point) <= reach
+    ]
 
 
 def tangent_of(n: Vector, tangent: ArrayLike | None) -> Vector:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arguments import Array
-from ..contours.contour import EXTENT, UNEXPLAINED, Contour, SamplingPlane
+from ..contours.contour import EXTENT, UNEXPLAINED, Contour, SamplingPlane, stops_at
 from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
@@ -132,20 +132,32 @@ class Touch:
         return shorter if shorter.result.status == "ok" else found
 
     def _shortened_until_sure(self, found: Exploration) -> Steps:
-        """The touch if it is sure ("ok"), or else felt again to the longest shorter extent where it is.
+        """The touch if it is sure, or else felt again to the longest shorter extent where it is.
 
-        If none of the `_shorter_extents` helps, the touch stays.
+        It is sure if its status is "ok" and no half curve ends at the point, as it does if its next contact
+        would be beyond an edge. If no shorter extent helps, it is the longest touch whose status is "ok".
         """
-        if found.result.status == "ok":
+        if self._is_sure(found):
             return found
-        for extent in _shorter_extents(found):
+        extents = list(_shorter_extents(found))
+        if found.result.status == "ok":
+            # A point on the edge itself has no shorter curves, and a drag along it would wait for each.
+            step = self.options.step or extents[-1] / CONTACT_COUNTS[0]
+            if stops_at(self.follow(self.options.planes, step=step)(extents[-1]), self.point):
+                return found
+        for extent in extents:
             try:
                 shorter, _ = self._tapped((yield from self._of_extent(extent)))
             except ValueError:  # So short curves carry no fit, or the given step is longer.
                 break
-            if shorter.result.status == "ok":
+            if self._is_sure(shorter):
                 return shorter
+            if found.result.status != "ok" == shorter.result.status:
+                return (yield from self._shortened_until_sure(shorter))
         return found
+
+    def _is_sure(self, found: Exploration) -> bool:
+        return found.result.status == "ok" and not stops_at(found.contours, self.point)
 
     def _tapped(self, found: Exploration) -> tuple[Exploration, Array]:
         """The touch together with its taps, and the places (k, 2) where they contradict it."""

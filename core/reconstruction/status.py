@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..bayes.posterior import CONFIDENCE, terms_to
-from ..contours.contour import SURFACE_ENDS, UNEXPLAINED
+from ..contours.contour import SURFACE_ENDS, UNEXPLAINED, stops_at
 from ..patch.domain import AT_POINT
 
 # benchmarks.stability chose these, and benchmarks.real LIKELY and those of taps. A fit is in doubt beyond
@@ -101,11 +101,7 @@ def over_nothing(share: float) -> tuple[str, str]:
 
 def _is_at_edge(r: Judged) -> bool:
     """Whether the surface ends at the point, as a half curve shows."""
-    return any(
-        stop in SURFACE_ENDS and np.linalg.norm(end - r.frame.origin) <= AT_POINT * r.radius
-        for contour in r.contours
-        for end, stop in zip(contour.points[[0, -1]], contour.stops or (), strict=False)
-    )
+    return any(stop in SURFACE_ENDS for stop in stops_at(r.contours, r.frame.origin, AT_POINT * r.radius))
 
 
 def notes(r: Judged) -> str:

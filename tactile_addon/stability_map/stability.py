@@ -17,7 +17,6 @@ from ..touch.arrays import read_array
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.evaluated_mesh import evaluated_object, size_of
 from ..touch.touch_object import FARTHEST_SHARE, LEAST_STEPS, require_fine, require_lengths
-from ..touch.touch_report import stops_at
 from ..touch.types import Array, Object, Point, Triple
 from ..touch.units import length
 
@@ -168,7 +167,7 @@ class StabilityMap:
         for (number, foot), touch in zip(feet.items(), found, strict=True):
             if isinstance(touch, ValueError):
                 self.reason[number] = self._why_none(*foot)
-            elif ended := stops_at(touch.contours, foot[0]):
+            elif ended := core.stops_at(touch.contours, foot[0]):
                 self.reason[number] = _reason_of(ended)
             else:
                 self._note(number, touch)
@@ -181,7 +180,7 @@ class StabilityMap:
         except ValueError:  # The settings are valid, so a face there has no area.
             return REASON_KEYS.index("nothing")
         shortest = min(contours, key=lambda contour: len(contour.points))
-        return _reason_of(stops_at(contours, point) or shortest.stops)
+        return _reason_of(core.stops_at(contours, point) or shortest.stops)
 
     def _note(self, number: int, touch: core.Exploration) -> None:
         result, surface = touch.result, self.surface

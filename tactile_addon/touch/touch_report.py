@@ -7,13 +7,9 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any, TypedDict
 
-import numpy as np
-
 from ... import core
-from .types import Array, Point
+from .types import Array
 
-# The surface itself ends a curve in these ways.
-SURFACE_STOPS = (core.CREASE, core.NO_CONTACT, core.NOT_MONGE)
 RIM_POINTS = 48  # The deviation of the height is looked at in this many places of the boundary.
 AT_POINT = 1e-6  # A half curve that is shorter than this share of the radius ends at the point.
 
@@ -136,16 +132,6 @@ def ends(contours: Sequence[core.Contour], has_extent: bool) -> str:
     return f" {', '.join(words)}{', before the extent' if has_extent else ''}."
 
 
-def stops_at(contours: Sequence[core.Contour], point: Point | Array, reach: float = 0.0) -> list[str]:
-    """Why half curves end at the point already, within `reach`; it is then on a crease or an edge."""
-    return [
-        stop
-        for contour in contours
-        for end, stop in zip((0, -1), contour.stops or (), strict=False)
-        if stop in SURFACE_STOPS and np.linalg.norm(contour.points[end] - point) <= reach
-    ]
-
-
 def judgment(result: core.Reconstruction, error: core.MeshError, ended: str, few_facets: bool) -> TouchReport:
     """Status and message, see core.judged_by_mesh; `ended` is added to the fit's own message.
 
@@ -155,7 +141,7 @@ def judgment(result: core.Reconstruction, error: core.MeshError, ended: str, few
     """
     status, message = core.judged_by_mesh(result, error)
     message += ended if message == result.message else ""
-    stops = stops_at(result.contours, result.frame.origin, AT_POINT * result.radius)
+    stops = core.stops_at(result.contours, result.frame.origin, AT_POINT * result.radius)
     if status == "ok" and (stops or few_facets):
         status = "uncertain"
     if stops:

@@ -144,6 +144,24 @@ def test_a_touch_is_as_long_as_it_is_sure():
     assert explore(Strip(), extent=1.2 * found.extent).result.status == "uncertain"
 
 
+@pytest.mark.parametrize("beside", [0.007, 0.0035])
+def test_beside_an_edge_a_touch_is_so_short_that_its_curves_have_contacts_on_all_sides(beside):
+    """At the first length the next contact of a half curve would be beyond the edge of the narrow wall."""
+    point = (-0.1, -0.7, beside - 0.04)
+    found = explore(solids.block(1.0, 0.7, 0.04), point, (0.0, -1.0, 0.0), farthest=1.0)
+    assert found.result.status == "ok"
+    assert core.stops_at(found.contours, point) == []
+    assert found.extent > 5.0 * beside
+
+
+def test_next_to_an_edge_that_no_shorter_touch_keeps_clear_of_none_is_tried(monkeypatch):
+    wall, point = solids.block(1.0, 0.7, 0.04), (-0.1, -0.7, -0.038)
+    found, results = fits_of(monkeypatch, wall, point=point, normal=(0.0, -1.0, 0.0), farthest=1.0)
+    assert core.stops_at(found.contours, point)
+    assert found.extent > 0.1
+    assert len(results) < 30  # There are nine lengths down to a quarter, each a fit.
+
+
 def test_on_a_narrow_wall_a_touch_is_as_long_as_it_is_sure():
     """The wall is 1.4 long and .08 wide: curves that run along it do not show how it bends across."""
     wall, point = solids.block(1.0, 0.7, 0.04), (1.0, 0.1, 0.004)
