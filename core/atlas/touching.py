@@ -21,6 +21,7 @@ from ..steps import part_of, result_of
 from ..triangles import row_dot
 from .borders import felt_border, snapped_to_border
 from .charts import Charts
+from .field import covered
 from .finger import FACING, finger_at
 from .frontier import Frontier
 from .join import Table, blend_heights, refit
@@ -39,13 +40,13 @@ NARROW = 1.0  # Where a touch was in vain before, a patch needs a radius of only
 SIDE_BY_SIDE = 8  # This many touches at once are faster, and still done in a tenth of a second.
 NEAR = 3.0  # A patch ends where the surface is off it by more tolerances.
 AGAIN = 3  # Where something is missing or less certain, touches go on at most this often.
-CHECKS, CHECK_SEED = 256, 0  # This many rays from outside check the surface.
+CHECKS, CHECK_SEED = 512, 0  # This many rays from outside check the surface.
 HAIR = 0.01  # A ray that meets nothing is cast again this share of the tolerance aside.
 SHARPEST, SPIKES = 64, 16  # This many go to its sharpest vertices, and to the triangles around the sharpest.
 STRAIGHT = 0.5  # A ray must meet what it is aimed at if the cosine between it and the normal is more.
 JOINED = 0.5  # Joining is this share of the way to a surface that is checked.
 BORDERS = 2  # This often a mesh is moved to the borders that are felt.
-ROUGH_APART = 0.5  # Touches where the surface is less certain are this many radii apart.
+AGAIN_APART = 0.5  # Touches that improve the joined surface are this many radii apart.
 LARGER = 2.0  # A touch reaches at most this many radii of the patch from which it goes on.
 
 PointNormal = tuple[ArrayLike, ArrayLike]  # A point and its normal, (3,) each.
@@ -228,11 +229,25 @@ class _Run:
         return (yield from refit(contours, results, self.frontier.charts, self.options.noise, earlier))
 
     def going_on(self, contacts: Sequence[PointNormal], farthest: float) -> Generator[Progress, object, None]:
-        """Touches at contacts, and all over from there."""
-        few = contacts[: self.most - self.done]
-        while few and not self.is_stopped:
-            some, few = few[:SIDE_BY_SIDE], few[SIDE_BY_SIDE:]
+        """Touches at contacts, and all over from there.
+
+        Of contacts that are near each other only the first is touched, unless its patch leaves others out.
+        """
+        points, normals = (np.array(values) for values in zip(*contacts, strict=True))
+        left, first = np.arange(len(points)), len(self.found)
+        while len(left) and self.done < self.most and not self.is_stopped:
+            few: list[int] = []
+            for i in left.tolist():
+                apart = np.linalg.norm(points[few] - points[i], axis=1)
+                if (
+                    len(few) < min(SIDE_BY_SIDE, self.most - self.done)
+                    and (apart > AGAIN_APART * farthest).all()
+                ):
+                    few.append(i)
+            some = list(zip(points[few], normals[few], strict=True))
             new = yield from self.showing(self.touching(some, farthest, [NARROW] * len(some)))
+            left = np.setdiff1d(left, few)
+            left = left[~covered(self.frontier.charts, points[left], normals[left], AGAIN_APART, first)]
             yield from self.show(self.now(new=new))
         yield from _all_over(self)
 
@@ -296,7 +311,7 @@ class _Run:
             point, normal = vector_of(mesh.vertices[worst]), vector_of(normals[worst])
             contact = self.frontier.finger.near(point, normal, self.frontier.near)
             found += [contact] if contact else []
-            apart = ROUGH_APART * self.frontier.charts.radii[mesh.patch[worst]]
+            apart = AGAIN_APART * self.frontier.charts.radii[mesh.patch[worst]]
             left = left[((mesh.vertices[left] - mesh.vertices[worst]) ** 2).sum(axis=1) > apart**2]
         return found
 
