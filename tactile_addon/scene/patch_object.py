@@ -36,7 +36,7 @@ COLLECTION = "Tactile Patches"
 CONTOUR_COLOR = (0.02, 0.02, 0.02, 1.0)
 # It is drawn above the mesh by as much as it may be below it: by these shares of its radius at least and at
 # most, and by this multiple of its height's deviation until it is compared with the mesh.
-DRAWN_ABOVE, MOST_ABOVE, DEVIATIONS = 5e-3, 5e-2, 3.0
+DRAWN_ABOVE, MOST_ABOVE, DEVIATIONS = 5e-3, 0.12, 3.0
 STEEP = 1.7  # Where a patch is steep, it has to go up by more, by this factor.
 
 

@@ -39,7 +39,9 @@ ABOVE_OTHERS = "Above Other Patches"  # The modifier that draws it above those w
 APART = 2.0  # by this multiple of the deviations of the heights of both,
 LEAST_LAYER, MOST_LAYER = 3e-3, 3e-2  # and by no less and no more than these shares of its radius.
 HIDDEN = 1.2 * HIGHEST  # A patch is so far above another, in radii of that, that its contours do not show.
-ALIKE = 0.5  # Patches overlap only if the cosine between their normals is more.
+ALIKE = (
+    0.1  # Patches overlap only if the cosine between their normals is more, as two walls of a block do not.
+)
 
 
 def recolor(obj: Object) -> None:

@@ -114,13 +114,25 @@ def test_patches_that_differ_by_their_errors_do_not_run_through_each_other(empty
     assert lines.modifiers[0].strength == touches[1].modifiers[0].strength > 0.0
 
 
-def test_eevee_draws_a_patch_above_the_mesh_where_it_is_below_it(empty):
+def test_patches_around_a_bend_do_not_run_through_each_other(empty):
+    """Their normals differ by up to 79 degrees."""
+    empty.ops.mesh.primitive_torus_add()
+    empty.context.object.modifiers.new("Subdivision", "SUBSURF").levels = 3
+    places = (0.823, -0.823, 0.17), (0.9805, -0.683, 0.133), (0.64, -0.64, 0.22)
+    patches = [touch(empty, place, target="Torus", extent=0.25) for place in places]
+    assert [patch["tactile_layer"] for patch in patches] == [0, 1, 2]
+    heights = [sum(modifier.strength for modifier in patch.modifiers) for patch in patches]
+    assert 0.0 == heights[0] < heights[1] < heights[2]
+
+
+@pytest.mark.parametrize(("place", "extent"), [((0.3, -0.3, 0.9), 0.4), ((0.5699, -0.406, 0.5021), 0.171)])
+def test_eevee_draws_a_patch_above_the_mesh_where_it_is_below_it(empty, place, extent):
     empty.ops.mesh.primitive_monkey_add()
     empty.context.object.modifiers.new("Subdivision", "SUBSURF").levels = 2
-    patch = touch(empty, (0.3, -0.3, 0.9), target="Suzanne")
+    patch = touch(empty, place, target="Suzanne", extent=extent)
     deepest = -values(patch.data, "deviation").min()
     radius = patch["tactile"]["radius"]
-    assert 0.01 * radius < deepest < 0.05 * radius
+    assert 0.01 * radius < deepest < 0.1 * radius
     for obj in (patch, *patch.children):
         assert obj["tactile_above"] > deepest
 
