@@ -62,7 +62,7 @@ def judged_by_mesh(r: Reconstruction, error: MeshError) -> tuple[str, str]:
     """Status and message: those of the fit, unless it has no doubt but the mesh contradicts it."""
     std, percent, mean = r.mean_height_std, 100.0 / r.radius, error.height or 0.0
     if r.status == "ok" and error.missing > DOUBTFUL_GAP:
-        return over_nothing(error.missing)
+        return over_nothing(r, error.missing)
     if r.status != "ok" or mean <= CONTRADICTING * std:
         return r.status, r.message
     return "uncertain", (

@@ -78,8 +78,7 @@ def contradicted(r: Judged) -> tuple[str, str] | None:
     if taps.off:
         return "uncertain", (
             f"Between the curves the surface is up to {100.0 * taps.off:.2g} % of the radius off the "
-            "patch, perhaps at an edge or a pocket that no curve crosses: use a shorter extent or add "
-            "sampling planes."
+            f"patch, perhaps at an edge or a pocket that no curve crosses: {_denser(r)}."
         )
     if taps.missed and _is_at_edge(r):
         return "uncertain", (
@@ -87,16 +86,23 @@ def contradicted(r: Judged) -> tuple[str, str] | None:
             "edge."
         )
     if taps.missing > DOUBTFUL_GAP:
-        return over_nothing(taps.missing)
+        return over_nothing(r, taps.missing)
     return None
 
 
-def over_nothing(share: float) -> tuple[str, str]:
+def over_nothing(r: Judged, share: float) -> tuple[str, str]:
     """The status and a sentence of advice if there is no surface at this share of a patch's area."""
     return "uncertain", (
         f"At {100.0 * share:.0f} % of the patch there is no surface, which ends or has a hole between the "
-        "curves: use a shorter extent or add sampling planes."
+        f"curves: {_denser(r)}."
     )
+
+
+def _denser(r: Judged) -> str:
+    """What brings curves nearer to each other: a touch that chose its extent has tried shorter ones."""
+    stops = {stop for contour in r.contours for stop in contour.stops or ()}
+    has_tried = r.method == "bayes" and UNEXPLAINED in stops
+    return "add sampling planes" if has_tried else "use a shorter extent or add sampling planes"
 
 
 def _is_at_edge(r: Judged) -> bool:
@@ -166,10 +172,7 @@ def _about_heights(r: Judged) -> Iterator[str]:
     """Whether heights are uncertain."""
     share = r.mean_height_std / r.radius
     if share > DOUBTFUL_STD:
-        yield (
-            f"Heights are accurate to {100.0 * share:.1f} % of the radius on average: use a shorter "
-            "extent or add sampling planes."
-        )
+        yield (f"Heights are accurate to {100.0 * share:.1f} % of the radius on average: {_denser(r)}.")
 
 
 def _about_frame(r: Judged) -> Iterator[str]:
@@ -205,5 +208,5 @@ def _about_curves(r: Judged) -> Iterator[str]:
     if waves > DOUBTFUL_WAVES and not len(r.strokes):
         yield (
             f"Waves of {100.0 * waves:.1f} % of the radius run along the curves, which do not show where "
-            "they go on between them: use a shorter extent or add sampling planes."
+            f"they go on between them: {_denser(r)}."
         )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import surfaces
 
-from core import METHODS, Contour, DegenerateCurvesError, reconstruct
+from core import METHODS, UNEXPLAINED, Contour, DegenerateCurvesError, reconstruct
 from core.bayes.posterior import SurfacePosterior
 from core.contours.curves import curves_through, misses, stacked
 
@@ -43,6 +43,13 @@ def test_heights_that_are_good_to_little():
     assert r.status == "uncertain"
     assert f"Heights are accurate to {100 * r.mean_height_std / r.radius:.1f} % of the radius" in r.message
     assert "shorter extent or add sampling planes" in r.message
+
+
+def test_a_touch_that_has_tried_shorter_extents_is_not_advised_one():
+    s = surfaces.pear()
+    contours = [replace(c, stops=(UNEXPLAINED, UNEXPLAINED)) for c in contours_of(s, noise=1.5)]
+    assert "% of the radius on average: add sampling planes." in s.fit(contours).message
+    assert "use a shorter extent" in s.fit(contours, method="tagc").message  # It has tried none.
 
 
 def test_contacts_that_are_missed_by_more_than_their_noise_explains():
