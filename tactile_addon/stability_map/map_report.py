@@ -40,8 +40,9 @@ def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
 def map_summary(record: Mapping[str, Any]) -> str:
     """A sentence on what a stability map has found."""
     patches = many(record["patches"], "patch", "patches")
-    words = [f"{patches} at {many(record['touched'], 'point', 'points')}, {record['in_doubt']} in doubt"]
-    return "; ".join([*words, *(f"refused: {refused}" for refused in _refused(record))])
+    words = f"{patches} at {many(record['touched'], 'point', 'points')}, {record['in_doubt']} in doubt"
+    refused = _refused(record)
+    return f"{words}; refused: {', '.join(refused)}" if refused else words
 
 
 def _refused(record: Mapping[str, Any]) -> list[str]:
