@@ -341,6 +341,10 @@ class Atlas:
         """The length of the edges of the reference mesh."""
         return suggested_edge(self.patches, self.charts, self.reference.indicator)
 
+    def longest_edge(self) -> float:
+        """The longest edge with which the thinnest wall is not lost; `meshing` makes none that are longer."""
+        return WALL * self.reference.indicator.resolved
+
     def curvatures(self, mesh: Mesh) -> dict[str, Array]:
         """The curvatures of `curvatures_at` at the vertices of a mesh of this atlas."""
         return self.curvatures_at(mesh.vertices, mesh.normals)

@@ -23,7 +23,6 @@ from .object_operator import EDGE
 from .object_report import deviation, object_summary
 
 SEEN = 0.4  # The view is as wide as this share of the object's size.
-CLAMPED = 0.99  # Edges shorter than this share of what was asked for are those that thin walls need.
 REACHED = 0.5  # Where less than this share of the largest deviation is the surface's, it is the object's.
 
 
@@ -131,7 +130,7 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
         kept.keep(obj, self._touches)
         record = obj[patch_record.ATLAS_RECORD].to_dict()
         summary = object_summary(record)
-        if record["edge"] < CLAMPED * self.edge:
+        if self.edge > self._touches.whole.atlas.longest_edge():
             summary += f"; edges are {units.length(record['edge'])} long, as thin walls need"
         return report_done(self, summary)
 

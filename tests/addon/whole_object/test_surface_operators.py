@@ -40,6 +40,14 @@ def test_another_edge_length_needs_no_touches(empty, surface):
 
 
 @pytest.mark.long
+def test_edges_that_no_thin_wall_makes_shorter_are_not_said_to_be(empty, capfd):
+    empty.ops.mesh.primitive_cylinder_add()
+    made(empty.ops.tactile.touch_all_over, "tactile_object")
+    assert empty.ops.tactile.mesh_again(edge=0.1) == {"FINISHED"}
+    assert "thin walls" not in capfd.readouterr().out
+
+
+@pytest.mark.long
 def test_where_a_wall_is_thin_the_report_has_the_length_of_edges_that_were_made(empty, extension, capfd):
     empty.ops.mesh.primitive_cube_add()
     empty.context.object.scale.z = 0.05
