@@ -39,9 +39,9 @@ ABOVE_OTHERS = "Above Other Patches"  # The modifier that draws it above those w
 APART = 2.0  # by this multiple of the deviations of the heights of both,
 LEAST_LAYER, MOST_LAYER = 3e-3, 3e-2  # and by no less and no more than these shares of its radius.
 HIDDEN = 1.2 * HIGHEST  # A patch is so far above another, in radii of that, that its contours do not show.
-ALIKE = (
-    0.1  # Patches overlap only if the cosine between their normals is more, as two walls of a block do not.
-)
+# Patches overlap only if the cosine between their normals is more; that of two walls of a block is 0.
+ALIKE = 0.1
+STEEP = 0.7  # At a rim that is steep by 54 degrees this share of a height more is needed.
 
 
 def recolor(obj: Object) -> None:
@@ -142,7 +142,7 @@ def _draw_above(patch: Object, others: list[Object]) -> None:
     for obj in (patch, *sorted(higher, key=lambda each: each[LAYER])):
         below = [each for each in (patch, *others) if each.get(LAYER, 0) < obj[LAYER]]
         below = [each for each in below if _overlap(obj[RECORD], each[RECORD])]
-        height = max((_height(each) + _layer(obj, each) for each in below), default=_above_surfaces(obj))
+        height = max((_height_above(obj, each) for each in below), default=_above_surfaces(obj))
         for part in parts_of(obj):
             _lift(part, height)
 
@@ -169,16 +169,16 @@ def _apart(upper: Mapping[str, Any], lower: Mapping[str, Any]) -> float:
     return float(min(max(apart, LEAST_LAYER * radius), MOST_LAYER * radius))
 
 
-def _layer(upper: Object, lower: Object) -> float:
-    """How far above another a patch is drawn: by more than both may be off, as two in one place flicker."""
+def _height_above(upper: Object, lower: Object) -> float:
+    """How high a patch is drawn above another: by more than both may be off, as two in one place flicker."""
+    layer = max(_apart(upper[RECORD], lower[RECORD]), HIDDEN * lower[RECORD]["radius"])
+    modifier = lower.modifiers.get(ABOVE_OTHERS)
+    height = 0.0 if modifier is None else modifier.strength
+    # It goes up along its own normal, which at a steep rim is less along that of the lower one.
+    further = min(STEEP * height, layer)
     # Eevee draws each of them above the mesh as well, the lower one perhaps by more.
-    further = max(lower.get(ABOVE, 0.0) - upper.get(ABOVE, 0.0), 0.0)
-    return max(_apart(upper[RECORD], lower[RECORD]), HIDDEN * lower[RECORD]["radius"]) + further
-
-
-def _height(patch: Object) -> float:
-    modifier = patch.modifiers.get(ABOVE_OTHERS)
-    return 0.0 if modifier is None else modifier.strength
+    further += max(lower.get(ABOVE, 0.0) - upper.get(ABOVE, 0.0), 0.0)
+    return height + layer + further
 
 
 def _lift(obj: Object, height: float) -> None:

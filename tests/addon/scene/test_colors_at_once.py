@@ -96,20 +96,34 @@ def test_patches_over_each_other_do_not_flicker(empty, ball):
     assert len(third.modifiers) == 0
 
 
+def is_above(bpy, upper, lower):
+    """Whether no vertex of a patch, as Blender draws it, is below another patch."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    to_lower = lower.matrix_world.inverted() @ upper.matrix_world
+    below = lower.evaluated_get(depsgraph)
+    for vertex in upper.evaluated_get(depsgraph).data.vertices:
+        place = to_lower @ vertex.co
+        _, nearest, normal, _ = below.closest_point_on_mesh(place)
+        aside = (place - nearest) - (place - nearest).dot(normal) * normal
+        if aside.length <= 1e-3 and (place - nearest).dot(normal) <= 0.0:
+            return False
+    return True
+
+
+def test_a_patch_is_above_one_that_is_above_another_at_its_steep_rim_too(empty):
+    empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32)
+    places = (0.6, -0.6, 0.5), (0.75, -0.4, 0.5), (0.5, -0.5, 0.7)
+    touches = [touch(empty, place, extent=1.0) for place in places]
+    assert all(is_above(empty, upper, lower) for lower, upper in itertools.combinations(touches, 2))
+
+
 def test_patches_that_differ_by_their_errors_do_not_run_through_each_other(empty):
     """On the facets of a cylinder they differ by more than a share of the radius, and contours go along."""
     empty.ops.mesh.primitive_cylinder_add()
     empty.context.object.name = "Sphere"
     touches = [touch(empty, place) for place in ((0.3, -0.95, 0.0), (-0.2, -0.98, -0.3), (0.3, -0.95, 0.8))]
-    depsgraph = empty.context.evaluated_depsgraph_get()
     for lower, upper in itertools.pairwise(touches):
-        to_lower = lower.matrix_world.inverted() @ upper.matrix_world
-        below = lower.evaluated_get(depsgraph)
-        for vertex in upper.evaluated_get(depsgraph).data.vertices:
-            place = to_lower @ vertex.co
-            _, nearest, normal, _ = below.closest_point_on_mesh(place)
-            aside = (place - nearest) - (place - nearest).dot(normal) * normal
-            assert aside.length > 1e-3 or (place - nearest).dot(normal) > 0.0
+        assert is_above(empty, upper, lower)
     (lines,) = touches[1].children
     assert lines.modifiers[0].strength == touches[1].modifiers[0].strength > 0.0
 
