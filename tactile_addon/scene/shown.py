@@ -37,7 +37,8 @@ ERROR_SHARE = 8.0  # or than this one where K may be 0 all over the patch.
 LAYER = "tactile_layer"  # A patch's number among those that overlap; 0 is the lowest.
 ABOVE_OTHERS = "Above Other Patches"  # The modifier that draws it above those with lower numbers,
 APART = 2.0  # by this multiple of the deviations of the heights of both,
-LEAST_LAYER, MOST_LAYER = 3e-3, 3e-2  # and by no less and no more than these shares of its radius.
+LEAST_LAYER, MOST_LAYER = 3e-3, 3e-2  # and by no less and no more than these shares of its radius,
+MOST_BELOW = 6e-2  # but by as much as it is below its mesh, up to this share.
 HIDDEN = 1.2 * HIGHEST  # A patch is so far above another, in radii of that, that its contours do not show.
 # Patches overlap only if the cosine between their normals is more; that of two walls of a block is 0.
 ALIKE = 0.1
@@ -172,6 +173,7 @@ def _apart(upper: Mapping[str, Any], lower: Mapping[str, Any]) -> float:
 def _height_above(upper: Object, lower: Object) -> float:
     """How high a patch is drawn above another: by more than both may be off, as two in one place flicker."""
     layer = max(_apart(upper[RECORD], lower[RECORD]), HIDDEN * lower[RECORD]["radius"])
+    layer = max(layer, min(upper.get(ABOVE, 0.0), MOST_BELOW * upper[RECORD]["radius"]))
     modifier = lower.modifiers.get(ABOVE_OTHERS)
     height = 0.0 if modifier is None else modifier.strength
     # It goes up along its own normal, which at a steep rim is less along that of the lower one.

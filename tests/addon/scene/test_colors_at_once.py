@@ -117,6 +117,17 @@ def test_a_patch_is_above_one_that_is_above_another_at_its_steep_rim_too(empty):
     assert all(is_above(empty, upper, lower) for lower, upper in itertools.combinations(touches, 2))
 
 
+def test_a_patch_that_is_below_its_mesh_is_above_others(empty):
+    empty.ops.mesh.primitive_cone_add()
+    cone = empty.context.object
+    for given in ((0.3, -0.3, 0.1), (0.35, -0.2, 0.0), (0.2, -0.35, -0.05)):
+        place = cone.closest_point_on_mesh(given)[1]
+        empty.ops.tactile.pick(target="Cone", location=place, new=True)
+    first, _, third = (obj for obj in empty.data.objects if "tactile" in obj)
+    assert -values(third.data, "deviation").min() > 0.05 * third["tactile"]["radius"]
+    assert is_above(empty, third, first)
+
+
 def test_patches_that_differ_by_their_errors_do_not_run_through_each_other(empty):
     """On the facets of a cylinder they differ by more than a share of the radius, and contours go along."""
     empty.ops.mesh.primitive_cylinder_add()
