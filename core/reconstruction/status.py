@@ -100,8 +100,7 @@ def over_nothing(r: Judged, share: float) -> tuple[str, str]:
 
 def _denser(r: Judged) -> str:
     """What brings curves nearer to each other: a touch that chose its extent has tried shorter ones."""
-    stops = {stop for contour in r.contours for stop in contour.stops or ()}
-    has_tried = r.method == "bayes" and UNEXPLAINED in stops
+    has_tried = r.method == "bayes" and UNEXPLAINED in _stops(r)
     return "add sampling planes" if has_tried else "use a shorter extent or add sampling planes"
 
 
@@ -188,9 +187,13 @@ def _about_frame(r: Judged) -> Iterator[str]:
         )
 
 
+def _stops(r: Judged) -> set[str]:
+    return {stop for contour in r.contours for stop in contour.stops or ()}
+
+
 def _more_bend(r: Judged) -> str:
     """What shows more of the curvatures: curves that surface or fit have ended do not become longer."""
-    stops = {stop for contour in r.contours for stop in contour.stops or ()}
+    stops = _stops(r)
     if stops.intersection(SURFACE_ENDS):
         return "use a shorter extent, move the point away from the edge, or add sampling planes"
     return "add sampling planes" if UNEXPLAINED in stops else "use a longer extent or add sampling planes"
