@@ -14,7 +14,7 @@ from ..arguments import Array
 from ..reconstruction.result import Reconstruction
 
 # benchmarks.facets shows how far curvatures are off with these.
-OTHER = 0.27  # Curvatures are those of a facet if they are off by this share of the larger one of the shape,
+OTHER = 0.2  # Curvatures are those of a facet if they are off by this share of the larger one of the shape,
 SPAN = 2.0  # which follows from how facets turn within this many widths, and the radius of curvature.
 # Edges between these angles stand for a smooth bend,
 DISTINCT_COSINE, SMOOTH_COSINE = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))
