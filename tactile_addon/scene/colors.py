@@ -14,8 +14,9 @@ COLOR_STOPS = np.array([
     (253, 219, 199), (244, 165, 130), (214, 96, 77), (178, 24, 43),
 ]) / 255.0  # fmt: skip
 
-# Values are as good as 0 if no more than the share FEW of them are beyond this number of deviations.
-SIGNIFICANT, FEW = 1.96, 0.05
+# Values are as good as 0 if no more than the share FEW, which the range leaves out, are beyond this number of
+# deviations. Neighbors are alike, so more of them are beyond two deviations than chance would have.
+SIGNIFICANT, FEW = 3.0, 0.02
 UNKNOWN = (0.5, 0.5, 0.5, 1.0)  # The color of what has no value, in sRGB.
 
 

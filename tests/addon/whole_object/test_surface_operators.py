@@ -40,6 +40,14 @@ def test_another_edge_length_needs_no_touches(empty, surface):
 
 
 @pytest.mark.long
+def test_a_cylinder_is_pale_by_gaussian_curvature(empty):
+    empty.ops.mesh.primitive_cylinder_add()
+    surface, record = made(empty.ops.tactile.touch_all_over, "tactile_object")
+    known = np.abs(values(surface.data, "gaussian_curvature"))
+    assert np.quantile(known, 0.98) < 0.1 * record["color_limit"]
+
+
+@pytest.mark.long
 def test_edges_that_no_thin_wall_makes_shorter_are_not_said_to_be(empty, capfd):
     empty.ops.mesh.primitive_cylinder_add()
     made(empty.ops.tactile.touch_all_over, "tactile_object")
