@@ -32,6 +32,9 @@ SCATTERED, SCATTERED_DEVIATIONS = 0.15, 3.0
 CONTRADICTING_CURVE = 7.0  # Deviations by which half of a curve is off what the others show.
 DOUBTFUL_FIT = 0.01  # Share of the radius by which half of the contacts are off, beyond their noise.
 CONTRADICTING = 2.0  # Mean number of deviations by which the surface is off the patch between the curves.
+FLAT = 0.5  # A face is flat if at least this share of the contacts, those around the point,
+FLAT_COSINE = math.cos(math.radians(0.5))  # has normals that turn by less than half a degree.
+BENT, BENT_DEVIATIONS = 0.02, 3.0  # It has no such curvature times radius, of so many deviations.
 DOUBTFUL_GAP = 0.04  # Share of the area that has no surface: near a straight edge it may be 0.03.
 
 Judged = Any  # A Reconstruction, whose module imports this one.
@@ -65,7 +68,7 @@ def doubt(r: Judged) -> tuple[str, str] | None:
             f"{r.condition_number:.1e}): use another method or add sampling planes."
         )
     # The gravest come first.
-    each = (_about_point, _about_data, _about_heights, _about_frame, _about_curves)
+    each = (_about_point, _about_data, _about_heights, _about_frame, _about_curves, _about_bends)
     message = next((sentence for about in each for sentence in about(r)), None)
     return None if message is None else ("uncertain", message)
 
@@ -99,9 +102,13 @@ def over_nothing(r: Judged, share: float) -> tuple[str, str]:
 
 
 def _denser(r: Judged) -> str:
-    """What brings curves nearer to each other: a touch that chose its extent has tried shorter ones."""
-    has_tried = r.method == "bayes" and UNEXPLAINED in _stops(r)
-    return "add sampling planes" if has_tried else "use a shorter extent or add sampling planes"
+    """What brings curves nearer to each other."""
+    return "add sampling planes" if _has_tried_shorter(r) else "use a shorter extent or add sampling planes"
+
+
+def _has_tried_shorter(r: Judged) -> bool:
+    """Whether the touch chose its extent, and so has tried shorter ones."""
+    return r.method == "bayes" and UNEXPLAINED in _stops(r)
 
 
 def _is_at_edge(r: Judged) -> bool:
@@ -213,3 +220,30 @@ def _about_curves(r: Judged) -> Iterator[str]:
             f"Waves of {100.0 * waves:.1f} % of the radius run along the curves, which do not show where "
             f"they go on between them: {_denser(r)}."
         )
+
+
+def _about_bends(r: Judged) -> Iterator[str]:
+    """Whether the curvature at a flat face is that of what bends beside it."""
+    k1, k2 = abs(r.k1), abs(r.k2)
+    is_bent = k1 > BENT_DEVIATIONS * r.k1_std or k2 > BENT_DEVIATIONS * r.k2_std
+    if is_bent and max(k1, k2) * r.radius > BENT and _flat_share(r) > FLAT:
+        advice = "move the point away from them"
+        yield (
+            "The point is on a flat face, and the curvature is that of the bends beside it: "
+            f"{advice if _has_tried_shorter(r) else 'use a shorter extent or ' + advice}."
+        )
+
+
+def _flat_share(r: Judged) -> float:
+    """The share of contacts around the point whose normals are as at the point, up to the first other one."""
+    flat = number = 0
+    for contour in r.contours:
+        if contour.normals is None:
+            continue
+        at = int(np.argmin(np.linalg.norm(contour.points - r.frame.origin, axis=1)))
+        lengths = np.linalg.norm(contour.normals, axis=1)
+        turns = np.abs(contour.normals @ contour.normals[at]) < FLAT_COSINE * lengths * lengths[at]
+        for half in (turns[:at][::-1], turns[at + 1 :]):
+            flat += int(np.argmax(np.append(half, True)))
+            number += len(half)
+    return flat / max(number, 1)

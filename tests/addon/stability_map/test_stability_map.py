@@ -262,7 +262,7 @@ def test_each_of_nested_walls_is_compared_with_itself(empty, ball):
 
 @pytest.mark.long
 def test_a_bump_between_the_curves_shows_as_error(empty):
-    """What no curve has felt raises no doubt, but it is an error."""
+    """What no curve has felt is an error. Where curves feel its foot, they have a doubt."""
     obj = grid(empty, 120)
     co = positions(obj.data)
     away = np.hypot(co[:, 0] - 0.26, co[:, 1] - 0.15)
@@ -271,7 +271,8 @@ def test_a_bump_between_the_curves_shows_as_error(empty):
     obj.data.update()
     painted, _ = stability_map(empty, spacing=0.05, extent=0.4, step=0.05)
     error, ok = values(painted.data, "error"), values(painted.data, "reason") == PATCH
-    assert error[ok & (away > 0.15) & (away < 0.4)].max() > 5e-3
+    around = (away > 0.15) & (away < 0.4)
+    assert error[around].max() > 5e-3 > error[ok & around].max() > 2e-3
     assert error[ok & (away > 0.9)].max() < 1e-6
 
 

@@ -87,6 +87,37 @@ def test_the_curvature_of_an_arc_is_that_of_facets_where_it_is_off(facets, exten
     assert (max(abs(r.k1 + 1.0), abs(r.k2)) > 0.2) is few
 
 
+def rounded(radius=0.3, strips=16):
+    """A flat face from x = -.7 to .7, at z = 0, whose ends go down in quarters of a circle."""
+    angles = np.radians(np.linspace(0.0, 80.0, strips + 1))
+    end = np.column_stack([0.7 + radius * np.sin(angles), radius * (np.cos(angles) - 1.0)])
+    return Prism(np.vstack([end[::-1] * (-1.0, 1.0), end]))
+
+
+@pytest.mark.parametrize("strips", [4, 16, 64])
+def test_the_curvature_of_a_flat_face_is_not_that_of_the_bend_beside_it(strips):
+    prism = rounded(strips=strips)
+    r = core.explore(prism, (0.65, 0.0, 0.0), UP, extent=0.3).result
+    assert r.status == "uncertain"
+    assert r.message.startswith(
+        "The point is on a flat face, and the curvature is that of the bends beside it: use a shorter extent "
+        "or move the point away from them."
+    )
+    assert abs(r.k1) > 3.0 * r.k1_std
+    for x in (0.45, 0.55, 0.6, 0.65):
+        r = core.explore(prism, (x, 0.0, 0.0), UP, farthest=0.8).result
+        assert r.status == "ok"
+        assert abs(r.k1) < max(3.0 * r.k1_std, 0.02 / r.radius)
+        assert abs(r.k2) < max(3.0 * r.k2_std, 0.02 / r.radius)
+
+
+def test_a_bend_is_no_flat_face():
+    """The point is on the bend, whose radius is .3, between facets of .03."""
+    r = core.explore(rounded(), (0.85, 0.0, 0.3 * (math.sqrt(0.75) - 1.0)), UP, extent=0.12).result
+    assert r.status == "ok"
+    assert max(abs(r.k1), abs(r.k2)) == pytest.approx(1.0 / 0.3, rel=0.1)
+
+
 class Mesh:
     """Triangles of a convex mesh around the origin, which a ray meets."""
 
