@@ -21,6 +21,7 @@ PACES = {
     "extent": 1.5e-3, "spacing": 5e-4, "step": 1.5e-4, "edge": 1.5e-4, "noise": 1.5e-5, "tolerance": 1.5e-5
 }  # fmt: skip
 DECADES = range(-6, 7)  # The powers of ten of the properties' steps.
+MOST_DIGITS = 6  # Blender's properties have no more after the point.
 HIDDEN_UNSAVED: set[Any] = {"HIDDEN", "SKIP_SAVE", "SKIP_PRESET"}
 # Blender's units of length in meters, each with the least length that Blender shows in it.
 LENGTH_UNITS = {
@@ -98,7 +99,8 @@ def degree_field(given: Mapping[str, Any], found: Callable[[Object, str], float]
 def _field(name: str, given: Mapping[str, Any], decade: int, found: Callable[[Object, str], float]) -> Any:
     return FloatProperty(
         **{key: given[key] for key in ("name", "description", "subtype", "soft_min")},
-        precision=given.get("precision", 2),
+        # Without units Blender writes no more digits, however small the number is.
+        precision=max(given.get("precision", 2), min(1 - decade, MOST_DIGITS)),
         step=10.0**decade,
         options=HIDDEN_UNSAVED,
         get=lambda settings: getattr(settings, name) or found(settings.id_data, name),

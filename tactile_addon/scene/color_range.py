@@ -14,7 +14,8 @@ from ..touch.units import Unit
 from . import shown
 from .patch_record import ATLAS_RECORD, POWERS, RANGE, RECORD, is_colored, report_of
 
-LEAST_DRAWN, SMALL = 1e-4, 1e-6  # Ranges below the first are drawn in units of the second.
+LEAST_DRAWN, SMALL = 1e-4, 1e-6  # Ranges below the first are drawn in units of the second,
+MOST_DRAWN, LARGE = 1e5, 1e6  # and those above this one in units of that.
 
 
 def unit_of_range(patch: Object, scene: bpy.types.Scene) -> tuple[int, Unit]:
@@ -57,10 +58,10 @@ def _record(obj: Object) -> Any:
 
 
 def range_field(obj: Object) -> tuple[str, str]:
-    """The property to draw for the range, and the factor in its label: a field has six decimals."""
-    return (
-        ("tactile_range", "") if obj.tactile_range >= LEAST_DRAWN else ("tactile_small_range", f"{SMALL:g}")
-    )
+    """The property to draw for the range, and the factor in its label: a field has some seven digits."""
+    if obj.tactile_range < LEAST_DRAWN:
+        return "tactile_small_range", f"{SMALL:g}"
+    return ("tactile_large_range", f"{LARGE:g}") if obj.tactile_range > MOST_DRAWN else ("tactile_range", "")
 
 
 def _get(obj: Object) -> float:
@@ -91,4 +92,5 @@ def _field(name: str, unit: float) -> Any:
 PROPERTIES = {
     "tactile_range": _field("Range", 1.0),
     "tactile_small_range": _field("Range in Millionths", SMALL),
+    "tactile_large_range": _field("Range in Millions", LARGE),
 }

@@ -95,7 +95,8 @@ def _error_range(mesh: bpy.types.Mesh, shown: str, unknown: Any, floor: float) -
     k, std = (np.delete(values(mesh, name), unknown) for name in (shown, GAUSSIAN_STD))
     if colors.symmetric_range(k, 0.0) <= PALE * floor or not colors.are_as_good_as_0(k, std):
         return 0.0
-    return ERROR_SHARE / LEAST_SHARE * floor
+    # What little is beyond its deviations, as near the tip of a cone, is no darker than half the range.
+    return max(ERROR_SHARE / LEAST_SHARE * floor, 2.0 * float(np.abs(k).max()))
 
 
 def _unknown(mesh: bpy.types.Mesh) -> Any:

@@ -23,7 +23,9 @@ from .object_operator import EDGE
 from .object_report import deviation, object_summary
 
 SEEN = 0.4  # The view is as wide as this share of the object's size.
-REACHED = 0.5  # Where less than this share of the largest deviation is the surface's, it is the object's.
+REACHED = (
+    0.5  # Where the surface has less than this share of the largest deviation, it does not reach the object.
+)
 
 
 class TACTILE_OT_look_farthest(bpy.types.Operator):
@@ -50,7 +52,8 @@ class TACTILE_OT_look_farthest(bpy.types.Operator):
         place = Vector(np.subtract(record["deviation_place"], record["origin"]))
         own_mesh(obj)
         nearest = _select_nearest(obj.data, place)
-        is_reached = abs(values(obj.data, DEVIATION)[nearest.index]) >= REACHED * record["deviation_max"]
+        largest, there = record["deviation_max"], abs(values(obj.data, DEVIATION)[nearest.index])
+        is_reached = there >= REACHED * largest or largest <= record["edge"]
         make_active(context, obj)
         place, turn = obj.matrix_world @ place, obj.matrix_world.to_quaternion()
         context.scene.cursor.location = place

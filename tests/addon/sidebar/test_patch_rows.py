@@ -113,6 +113,14 @@ def test_a_number_is_dragged_by_the_size_of_the_object(empty, extension, meters,
         assert 1.0 / 40.0 < pace < 40.0, (name, pace)
 
 
+def test_without_units_a_short_length_has_digits_enough(empty, extension):
+    empty.context.scene.unit_settings.system = "NONE"
+    number_fields = extension.tactile_addon.probes.number_fields
+    group = empty.types.Object.bl_rna.properties["tactile_probe"].fixed_type
+    for size, least in ((2e-3, 5), (2.0, 2)):
+        assert group.properties[number_fields.fields(size)["extent"]].precision == least
+
+
 def test_a_number_that_is_left_to_the_surface_shows_what_it_has(empty, extension):
     size = 0.065
     empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=0.5 * size)

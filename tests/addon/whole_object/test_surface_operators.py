@@ -48,6 +48,13 @@ def test_a_cylinder_is_pale_by_gaussian_curvature(empty):
 
 
 @pytest.mark.long
+def test_the_tip_of_a_cone_is_not_red_where_no_curvature_is_known(empty):
+    empty.ops.mesh.primitive_cone_add()
+    surface, record = made(empty.ops.tactile.touch_all_over, "tactile_object")
+    assert np.abs(values(surface.data, "gaussian_curvature")).max() <= 0.5 * record["color_limit"] + 1e-9
+
+
+@pytest.mark.long
 def test_edges_that_no_thin_wall_makes_shorter_are_not_said_to_be(empty, capfd):
     empty.ops.mesh.primitive_cylinder_add()
     made(empty.ops.tactile.touch_all_over, "tactile_object")
@@ -109,6 +116,16 @@ def test_the_farthest_place_is_shown_where_the_surface_is_now(empty, surface):
     assert np.linalg.norm(found - place) < 0.1
     assert empty.context.view_layer.objects.active == surface
     assert surface.tactile_colors == "deviation"
+
+
+@pytest.mark.long
+def test_a_surface_reaches_what_is_nearer_than_an_edge_is_long(empty, surface, capfd):
+    record = surface["tactile_object"]
+    surface.data.attributes["deviation"].data.foreach_set("value", np.zeros(len(surface.data.vertices)))
+    for largest, is_reached in ((0.9 * record["edge"], True), (3.0 * record["edge"], False)):
+        record["deviation_max"] = largest
+        assert empty.ops.tactile.look_farthest() == {"FINISHED"}
+        assert ("which does not reach it" not in capfd.readouterr().out) is is_reached
 
 
 @pytest.mark.long
