@@ -23,9 +23,7 @@ from .object_operator import EDGE
 from .object_report import deviation, object_summary
 
 SEEN = 0.4  # The view is as wide as this share of the object's size.
-REACHED = (
-    0.5  # Where the surface has less than this share of the largest deviation, it does not reach the object.
-)
+REACHED = 0.5  # A surface with less than this share of the largest deviation does not reach the object there.
 
 
 class TACTILE_OT_look_farthest(bpy.types.Operator):
