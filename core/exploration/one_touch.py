@@ -19,9 +19,10 @@ from .taps import Tapped, adjacent_half_curves
 
 HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed --base).
 FINER = 8.0  # Steps are shorter by this factor if curves have too few contacts (benchmarks.atlas --shapes).
-# Half curves next to a contradiction, or all those of a touch in doubt, are shortened by this factor at once
-SHORTER = 1.15  # (benchmarks.real --only taps),
-LEAST_SHARE = 0.25  # but not all of them to less than this share (benchmarks.real --only automatic),
+# Half curves next to a contradiction, or all those of a touch with one, are shortened by this factor at once
+SHORTER = 1.15  # (benchmarks.real --only taps), and all those of another touch in doubt by the next,
+NEXT_EXTENT = 1.07  # but not all of them to less than this share (benchmarks.real --only automatic),
+LEAST_SHARE = 0.25
 STRIP = 4.0  # unless this multiple of a strip's width is less.
 
 
@@ -239,19 +240,22 @@ class Touch:
 
 
 def _shorter_extents(found: Exploration) -> Iterator[float]:
-    """Extents that shrink by the factor SHORTER to LEAST_SHARE, and to the width of a strip that is narrower.
+    """Extents that shrink by a factor to LEAST_SHARE, and to the width of a strip that is narrower.
 
-    Across a strip most half curves are short, and show no curvature in units of a long patch.
+    Across a strip most half curves are short, and show no curvature in units of a long patch. What taps have
+    found stays where it is: the more extents are tried, the more likely one has no tap there.
     """
+    taps = found.result.taps
+    factor = SHORTER if taps is not None and taps.off else NEXT_EXTENT
     origin, extent = found.result.frame.origin, found.extent
-    while extent > SHORTER * LEAST_SHARE * found.extent:
-        extent /= SHORTER
+    while extent > factor * LEAST_SHARE * found.extent:
+        extent /= factor
         yield extent
     ends = np.array([contour.points[[0, -1]] for contour in found.contours])
     width = float(np.median(np.linalg.norm(ends - origin, axis=2)))
     extent = min(extent, STRIP * width)
-    while extent > SHORTER * width:
-        extent /= SHORTER
+    while extent > factor * width:
+        extent /= factor
         yield extent
 
 
