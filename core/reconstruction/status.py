@@ -242,7 +242,7 @@ def _flat_share(r: Judged) -> float:
             continue
         at = int(np.argmin(np.linalg.norm(contour.points - r.frame.origin, axis=1)))
         lengths = np.linalg.norm(contour.normals, axis=1)
-        turns = np.abs(contour.normals @ contour.normals[at]) < FLAT_COSINE * lengths * lengths[at]
+        turns = np.abs(contour.normals @ contour.normals[at]) <= FLAT_COSINE * lengths * lengths[at]
         for half in (turns[:at][::-1], turns[at + 1 :]):
             flat += int(np.argmax(np.append(half, True)))
             number += len(half)

@@ -4,6 +4,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -109,6 +110,15 @@ def test_the_curvature_of_a_flat_face_is_not_that_of_the_bend_beside_it(strips):
         assert r.status == "ok"
         assert abs(r.k1) < max(3.0 * r.k1_std, 0.02 / r.radius)
         assert abs(r.k2) < max(3.0 * r.k2_std, 0.02 / r.radius)
+
+
+@pytest.mark.parametrize("normals", [None, 0.0, 2.0, -1.0])
+def test_a_face_is_flat_by_normals_of_any_length(normals):
+    contours = core.explore(rounded(), (0.65, 0.0, 0.0), UP, extent=0.3).contours
+    given = [None if normals is None else normals * contour.normals for contour in contours]
+    again = [replace(contour, normals=each) for contour, each in zip(contours, given, strict=True)]
+    message = core.reconstruct((0.65, 0.0, 0.0), again, outward=UP).message
+    assert message.startswith("The point is on a flat face") is bool(normals)
 
 
 def test_a_bend_is_no_flat_face():
