@@ -192,13 +192,18 @@ def equal_points(points: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return order, np.flatnonzero(np.append(True, changes)[: len(order)])
 
 
+def unit_normals(normals: Array) -> Array:
+    """Normals (n, 3) of any length, scaled to length 1; (0, 0, 0) stays."""
+    unit = normals / np.maximum(np.abs(normals).max(axis=1, keepdims=True), 1e-300)
+    return np.asarray(unit / np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-300))
+
+
 def consistently_oriented(normals: Array, order: NDArray[np.intp], starts: NDArray[np.intp]) -> Array:
     """Unit normals (n, 3), each flipped to the side of the first in its group; (0, 0, 0) stays.
 
     order, starts : groups of contacts, as `equal_points` returns them
     """
-    unit = normals / np.maximum(np.abs(normals).max(axis=1, keepdims=True), 1e-300)
-    unit /= np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-300)
+    unit = unit_normals(normals)
     group = np.empty(len(order), dtype=np.intp)
     group[order] = np.searchsorted(starts, np.arange(len(order)), side="right") - 1
     side = np.einsum("ni,ni->n", unit, unit[order[starts]][group])

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..bayes.posterior import CONFIDENCE, terms_to
-from ..contours.contour import SURFACE_ENDS, UNEXPLAINED, stops_at
+from ..contours.contour import SURFACE_ENDS, UNEXPLAINED, stops_at, unit_normals
 from ..patch.domain import AT_POINT
 
 # benchmarks.stability chose these, and benchmarks.real LIKELY and those of taps. A fit is in doubt beyond
@@ -241,8 +241,8 @@ def _flat_share(r: Judged) -> float:
         if contour.normals is None:
             continue
         at = int(np.argmin(np.linalg.norm(contour.points - r.frame.origin, axis=1)))
-        lengths = np.linalg.norm(contour.normals, axis=1)
-        turns = np.abs(contour.normals @ contour.normals[at]) <= FLAT_COSINE * lengths * lengths[at]
+        normals = unit_normals(contour.normals)
+        turns = np.abs(normals @ normals[at]) < FLAT_COSINE
         for half in (turns[:at][::-1], turns[at + 1 :]):
             flat += int(np.argmax(np.append(half, True)))
             number += len(half)

@@ -112,7 +112,7 @@ def test_the_curvature_of_a_flat_face_is_not_that_of_the_bend_beside_it(strips):
         assert abs(r.k2) < max(3.0 * r.k2_std, 0.02 / r.radius)
 
 
-@pytest.mark.parametrize("normals", [None, 0.0, 2.0, -1.0])
+@pytest.mark.parametrize("normals", [None, 0.0, 2.0, -1.0, 1e-310, 1e300])
 def test_a_face_is_flat_by_normals_of_any_length(normals):
     contours = core.explore(rounded(), (0.65, 0.0, 0.0), UP, extent=0.3).contours
     given = [None if normals is None else normals * contour.normals for contour in contours]
