@@ -59,8 +59,8 @@ def recolor(obj: Object) -> None:
     if shown == "gaussian_curvature":
         floor = least_gaussian_range(np.delete(values(mesh, "curvedness"), unknown), floor)
     record["own_limit"] = colors.symmetric_range(np.delete(shades, unknown), floor)
-    common = max(obj.get(COMMON_RANGE, 0.0), _error_range(mesh, shown, unknown, floor))
-    limit = obj.get(RANGE) or max(record["own_limit"], common)
+    record["error_limit"] = _error_range(mesh, shown, unknown, floor)
+    limit = obj.get(RANGE) or _automatic_range(record, obj.get(COMMON_RANGE, 0.0))
     rgba = colors.diverging(np.append(shades, 0.0), limit, [len(shades)])
     at = np.arange(len(shades)) if RECORD in obj else _corners_shown(mesh, unknown, record["edge"])
     mesh.attributes[COLOR].data.foreach_set("color", rgba[at].ravel())
@@ -69,6 +69,13 @@ def recolor(obj: Object) -> None:
         mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
     mesh.update()
     record["color_limit"] = limit
+
+
+def _automatic_range(record: Mapping[str, Any], common: float) -> float:
+    """The range of a patch or whole object from its record, and from the common range of patches, or 0."""
+    if not common:
+        return float(max(record["own_limit"], record["error_limit"]))
+    return float(common if record["status"] == "uncertain" else max(common, record["own_limit"]))
 
 
 def least_gaussian_range(curvedness: Array, floor: float) -> float:
@@ -89,7 +96,7 @@ def _least_range(record: Mapping[str, Any], shown: str) -> float:
 
 
 def _error_range(mesh: bpy.types.Mesh, shown: str, unknown: Any, floor: float) -> float:
-    """The range that makes K pale where it is as good as 0, which is no range of other patches; or 0."""
+    """The range that makes K pale where it is as good as 0, or 0 where it is not."""
     if shown != "gaussian_curvature" or GAUSSIAN_STD not in mesh.attributes:
         return 0.0
     k, std = (np.delete(values(mesh, name), unknown) for name in (shown, GAUSSIAN_STD))
@@ -121,14 +128,22 @@ def settle(patch: Object) -> None:
 
 
 def share_range(patch: Object, others: list[Object] | None = None) -> None:
-    """Gives all patches of its mesh that show what a patch shows the largest range of those not in doubt."""
+    """Gives all patches of its mesh that show what a patch shows one range.
+
+    It is the largest of those that are not in doubt, or of all if all are. If the patch that has it has a K
+    that is as good as 0, it is the largest that makes such a K pale.
+    """
     same = [
         obj
         for obj in (_others(patch) if others is None else others)
         if obj[RECORD]["source"] == patch[RECORD]["source"] and obj.tactile_colors == patch.tactile_colors
     ]
-    sure = [obj[RECORD] for obj in (patch, *same) if obj[RECORD]["status"] != "uncertain"]
-    common = max((record.get("own_limit", 0.0) for record in sure), default=0.0)
+    records = [obj[RECORD] for obj in (patch, *same)]
+    sure = [record for record in records if record["status"] != "uncertain"]
+    largest = max(sure or records, key=lambda record: record.get("own_limit", 0.0))
+    common = largest.get("own_limit", 0.0)
+    if largest.get("error_limit"):
+        common = max(record.get("error_limit", 0.0) for record in sure or records)
     for obj in (patch, *same):
         if obj.get(COMMON_RANGE) != common:
             obj[COMMON_RANGE] = common

@@ -27,7 +27,8 @@ GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 class BothWays:
     """The deviations of a surface from the mesh that was touched, and back, found step by step.
 
-    deviation : (n,), signed distances of the surface's vertices from the mesh, positive outside it
+    deviation : (n,), signed distances of the surface from the mesh, positive outside it: of each vertex, or
+        of the middle of a face around it that is farther off, as both ends of a long edge may be on the mesh
     mean : the mean distance of the surface from the mesh and of the mesh from the surface, by area
     within : the smaller share of both areas, of surface and mesh, that is within the tolerance of the other
     largest, place : the largest distance of either from the other, and where that is, (3,)
@@ -52,6 +53,7 @@ class BothWays:
         off = np.zeros(len(areas))
         yield 0.3
         yield from part_of(self._off_target(middles, normalized(across), off), 0.3, 0.7)
+        self._spread(off)
         there, places = np.abs(off), self._places()
         yield 0.7
         trees = yield from self._trees()
@@ -68,14 +70,22 @@ class BothWays:
         for start in range(0, len(points), AT_ONCE):
             some = slice(start, start + AT_ONCE)
             found = self._target.deviations(points[some], normals[some], WITHIN * self._target.size)
-            # Near a crease a ray along the normal may meet a face that is not the nearest.
-            for i in np.flatnonzero(np.abs(found) > self._tolerance).tolist():
+            # Near a crease a ray along the normal may meet a face that is not the nearest. Among those within
+            # the tolerance that matters only for the largest.
+            for i in np.flatnonzero(np.abs(found) > min(self._tolerance, self.largest)).tolist():
                 with suppress(ValueError):  # The nearest face has no area.
                     nearest = self._target.project(points[start + i].tolist())[2]
                     found[i] = math.copysign(min(abs(found[i]), nearest), found[i])
             off[some] = found
             self._note(points[some], np.abs(found))
             yield start / len(points)
+
+    def _spread(self, off: Array) -> None:
+        """Gives vertices the distances (m,) of the faces around them that are farther off than they are."""
+        order, around = np.argsort(np.abs(off)), np.zeros(len(self.deviation))
+        around[self._mesh.triangles[order]] = off[order][:, None]  # The last, which is the largest, stays.
+        farther = np.abs(around) > np.abs(self.deviation)
+        self.deviation[farther] = around[farther]
 
     def _places(self) -> tuple[Array, Array]:
         """Places of the mesh, (n, 3) each: such that are spread by area over its faces, and vertices."""

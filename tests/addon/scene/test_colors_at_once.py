@@ -83,6 +83,32 @@ def test_patches_share_a_range_and_may_be_given_one(empty, ball, extension):
     assert patches[1]["tactile"]["color_limit"] == other["tactile"]["color_limit"]
 
 
+def test_patches_whose_curvature_is_as_good_as_0_have_one_range(empty):
+    empty.ops.mesh.primitive_cone_add()
+    empty.context.object.name = "Sphere"
+    places = ((0.3, -0.4, 0.0), (0.45, -0.5, -0.3), (0.1, -0.2, 0.6))
+    patches = [touch(empty, place, extent=0.0) for place in places]
+    limits = [patch["tactile"]["color_limit"] for patch in patches]
+    assert limits == [max(patch["tactile"]["error_limit"] for patch in patches)] * 3
+    assert min(limits) > 2.0 * max(patch["tactile"]["own_limit"] for patch in patches)
+
+
+def test_a_patch_in_doubt_has_the_range_of_those_that_are_sure(empty, ball):
+    sure, noisy, worse = (
+        touch(empty, (0, 0, 1)),
+        *(touch(empty, (0, 1, 0), extent=0.15, noise=n) for n in (0.02, 0.04)),
+    )
+    patches = (sure, noisy, worse)
+    assert [patch["tactile"]["status"] for patch in patches] == ["ok", "uncertain", "uncertain"]
+    own = [patch["tactile"]["own_limit"] for patch in patches]
+    assert min(own[1:]) > 1.05 * own[0]
+    assert [patch["tactile"]["color_limit"] for patch in patches] == [own[0]] * 3
+    empty.data.objects.remove(sure)
+    last = touch(empty, (0, -1, 0), noise=0.03)
+    (limit,) = {patch["tactile"]["color_limit"] for patch in (noisy, worse, last)}
+    assert limit >= max(*own[1:], last["tactile"]["own_limit"])
+
+
 def test_patches_over_each_other_do_not_flicker(empty, ball):
     """The second is drawn above the first, but not where it is rendered or exported."""
     first, second = touch(empty, (0, 0, 1)), touch(empty, (0.1, 0, 0.995))

@@ -63,6 +63,20 @@ def test_edges_that_no_thin_wall_makes_shorter_are_not_said_to_be(empty, capfd):
 
 
 @pytest.mark.long
+def test_colors_show_how_far_long_edges_are_off(empty):
+    empty.ops.mesh.primitive_cone_add()
+    surface, _ = made(empty.ops.tactile.touch_all_over, "tactile_object")
+    assert empty.ops.tactile.mesh_again(edge=0.2) == {"FINISHED"}
+    record = surface["tactile_object"]
+    assert record["deviation_max"] > 4.0 * record["tolerance"]
+    off = np.abs(values(surface.data, "deviation"))
+    assert 0.7 * record["deviation_max"] < off.max() <= record["deviation_max"] * (1.0 + 1e-6)
+    place = np.subtract(record["deviation_place"], record["origin"])
+    nearest = np.argmin(np.linalg.norm(positions(surface.data) - place, axis=1))
+    assert off[nearest] > record["tolerance"]
+
+
+@pytest.mark.long
 def test_where_a_wall_is_thin_the_report_has_the_length_of_edges_that_were_made(empty, extension, capfd):
     empty.ops.mesh.primitive_cube_add()
     empty.context.object.scale.z = 0.05

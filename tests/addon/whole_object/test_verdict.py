@@ -310,3 +310,18 @@ def test_there_is_no_tick_where_heights_are_worse_than_the_tolerance(extension, 
     report = touches.report()
     assert report["message"].startswith("Heights are accurate to ")
     assert extension.tactile_addon.whole_object.object_report.verdict_of(report) == "Doubtful"
+
+
+@pytest.mark.long
+def test_the_largest_deviation_is_that_from_the_nearest_place(empty):
+    """Along a slanted normal at a rounded edge the wall is farther away, though within the tolerance."""
+    empty.ops.mesh.primitive_cube_add()
+    half = np.array((1.0, 0.7, 0.04))
+    empty.context.object.scale = half
+    surface, record = touched(empty, noise=0.002, seed=4)
+    beyond = np.abs(positions(surface.data)) - half
+    outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+    off = np.maximum(
+        outside, -beyond.max(axis=1)
+    )  # The exact distance from a box; inside it is the least depth.
+    assert 0.9 * off.max() < record["deviation_max"] < 1.5 * off.max()
