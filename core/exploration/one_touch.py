@@ -19,10 +19,9 @@ from .taps import Tapped, adjacent_half_curves
 
 HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed --base).
 FINER = 8.0  # Steps are shorter by this factor if curves have too few contacts (benchmarks.atlas --shapes).
-# Half curves next to a contradiction, or all those of a touch with one, are shortened by this factor at once
-SHORTER = 1.15  # (benchmarks.real --only taps), and all those of another touch in doubt by the next,
-NEXT_EXTENT = 1.07  # but not all of them to less than this share (benchmarks.real --only automatic),
-LEAST_SHARE = 0.25
+SHORTER = 1.15  # Half curves next to a contradiction become shorter by this (benchmarks.real --only taps).
+# A touch in doubt becomes shorter by the same if taps contradict it, or else by this factor, at most to
+NEXT_EXTENT, LEAST_SHARE = 1.07, 0.25  # this share of its extent (benchmarks.real --only automatic),
 STRIP = 4.0  # unless this multiple of a strip's width is less.
 
 
@@ -242,8 +241,8 @@ class Touch:
 def _shorter_extents(found: Exploration) -> Iterator[float]:
     """Extents that shrink by a factor to LEAST_SHARE, and to the width of a strip that is narrower.
 
-    Across a strip most half curves are short, and show no curvature in units of a long patch. What taps have
-    found stays where it is: the more extents are tried, the more likely one has no tap there.
+    Across a strip most half curves are short, and show no curvature in units of a long patch. If taps
+    contradict a touch, few extents are tried: of many, one may have no tap where the contradiction is.
     """
     taps = found.result.taps
     factor = SHORTER if taps is not None and taps.off else NEXT_EXTENT

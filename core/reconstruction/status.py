@@ -32,9 +32,9 @@ SCATTERED, SCATTERED_DEVIATIONS = 0.15, 3.0
 CONTRADICTING_CURVE = 7.0  # Deviations by which half of a curve is off what the others show.
 DOUBTFUL_FIT = 0.01  # Share of the radius by which half of the contacts are off, beyond their noise.
 CONTRADICTING = 2.0  # Mean number of deviations by which the surface is off the patch between the curves.
-FLAT = 0.5  # A face is flat if at least this share of the contacts, those around the point,
-FLAT_COSINE = math.cos(math.radians(0.5))  # has normals that turn by less than half a degree.
-BENT, BENT_DEVIATIONS = 0.02, 3.0  # It has no such curvature times radius, of so many deviations.
+FLAT = 0.5  # A point is on a flat face if more than this share of the contacts, those around it,
+FLAT_COSINE = math.cos(math.radians(0.5))  # have its normal, to half a degree. Its curvature is then below
+BENT, BENT_DEVIATIONS = 0.02, 3.0  # this share of 1 / radius, or this many deviations (tests of core.scan).
 DOUBTFUL_GAP = 0.04  # Share of the area that has no surface: near a straight edge it may be 0.03.
 
 Judged = Any  # A Reconstruction, whose module imports this one.
@@ -195,6 +195,7 @@ def _about_frame(r: Judged) -> Iterator[str]:
 
 
 def _stops(r: Judged) -> set[str]:
+    """Why half curves end."""
     return {stop for contour in r.contours for stop in contour.stops or ()}
 
 
@@ -223,19 +224,21 @@ def _about_curves(r: Judged) -> Iterator[str]:
 
 
 def _about_bends(r: Judged) -> Iterator[str]:
-    """Whether the curvature at a flat face is that of what bends beside it."""
-    k1, k2 = abs(r.k1), abs(r.k2)
-    is_bent = k1 > BENT_DEVIATIONS * r.k1_std or k2 > BENT_DEVIATIONS * r.k2_std
-    if is_bent and max(k1, k2) * r.radius > BENT and _flat_share(r) > FLAT:
+    """Whether the curvature on a flat face is that of the bends next to it."""
+    is_bent = any(
+        abs(k) > max(BENT / r.radius, BENT_DEVIATIONS * std)
+        for k, std in ((r.k1, r.k1_std), (r.k2, r.k2_std))
+    )
+    if is_bent and _flat_share(r) > FLAT:
         advice = "move the point away from them"
         yield (
-            "The point is on a flat face, and the curvature is that of the bends beside it: "
+            "The point is on a flat face, and the curvature is that of the bends next to it: "
             f"{advice if _has_tried_shorter(r) else 'use a shorter extent or ' + advice}."
         )
 
 
 def _flat_share(r: Judged) -> float:
-    """The share of contacts around the point whose normals are as at the point, up to the first other one."""
+    """The share of contacts with the normal at the point, on each half curve up to the first other one."""
     flat = number = 0
     for contour in r.contours:
         if contour.normals is None:

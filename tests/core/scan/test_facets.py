@@ -101,8 +101,8 @@ def test_the_curvature_of_a_flat_face_is_not_that_of_the_bend_beside_it(strips):
     r = core.explore(prism, (0.65, 0.0, 0.0), UP, extent=0.3).result
     assert r.status == "uncertain"
     assert r.message.startswith(
-        "The point is on a flat face, and the curvature is that of the bends beside it: use a shorter extent "
-        "or move the point away from them."
+        "The point is on a flat face, and the curvature is that of the bends next to it: use a shorter "
+        "extent or move the point away from them."
     )
     assert abs(r.k1) > 3.0 * r.k1_std
     for x in (0.45, 0.55, 0.6, 0.65):
