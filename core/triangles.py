@@ -26,3 +26,14 @@ def triangle_cross(triangles: Array) -> Array:
     """
     a, b, c = np.moveaxis(triangles, -2, 0)
     return np.cross(b - a, c - a)
+
+
+def middles_of_parts(n: int) -> Array:
+    """The barycentric coordinates (n^2, 3) of the middles of n^2 equal parts of a triangle.
+
+    Lines parallel to the sides divide each side into n.
+    """
+    i, j = (index.ravel() for index in np.indices((n, n)))
+    up, down = i + j < n, i + j < n - 1
+    first, second = (np.concatenate([(each[up] + 1 / 3), (each[down] + 2 / 3)]) / n for each in (i, j))
+    return np.column_stack([first, second, 1.0 - first - second])

@@ -197,6 +197,7 @@ def after_undo(*_: Any) -> None:
     """Puts back what is still there, and makes the handlers look at all probes."""
     undo.put_back()
     on_other_data()
+    deleted.remove_soon()
 
 
 HANDLERS = {

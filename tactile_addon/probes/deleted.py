@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from ..scene import patch_object, patch_record
+from ..scene import patch_object, patch_record, shown, undo
 from ..scene.viewports import has_gesture
 from ..touch.settings import silent
 from ..touch.types import Object
@@ -43,7 +43,7 @@ def forget_target(probe: Object) -> None:
     settings.property_unset("target")
     if not target.users:
         _deleted.add(target.session_uid)
-        _remove_soon()
+        remove_soon()
 
 
 def _follow(probe: Object, target: Object) -> None:
@@ -67,8 +67,8 @@ def _follow(probe: Object, target: Object) -> None:
         anchor.attach(probe, found)
 
 
-def _remove_soon() -> None:
-    """Calls `remove` later, because a handler may not delete what is being evaluated."""
+def remove_soon() -> None:
+    """Calls `remove` later in a window, because a handler may not delete what is being evaluated."""
     # Without a window no timer runs, and a registered one keeps Blender's module from ending.
     if not bpy.app.background and not bpy.app.timers.is_registered(remove):
         bpy.app.timers.register(remove)
@@ -95,7 +95,7 @@ def look_for_contours() -> None:
         if patch_record.CONTOURS in obj and obj.parent is not None:
             contour_owners[number] = obj.parent.session_uid
     if any(_is_left(obj, there) for obj in there.values()) or _unused_meshes():
-        _remove_soon()
+        remove_soon()
 
 
 def _is_left(obj: Object, there: dict[int, Object]) -> bool:
@@ -110,7 +110,10 @@ def _unused_meshes() -> list[bpy.types.Mesh]:
 
 
 def remove() -> float | None:
-    """Removes the datablocks of what was deleted if nobody uses them; Blender calls it as a timer."""
+    """Removes the datablocks of what was deleted if nobody uses them; Blender calls it as a timer.
+
+    The patches that are left may have a smaller range then.
+    """
     if has_gesture():
         return LATER
     there = {obj.session_uid: obj for obj in bpy.data.objects}
@@ -125,4 +128,6 @@ def remove() -> float | None:
     for obj in gone:
         bpy.data.objects.remove(obj)
     patch_object.remove_meshes(_unused_meshes())
+    with undo.after_step():
+        shown.share_ranges()
     return None

@@ -10,7 +10,7 @@ import bpy
 from bpy.props import IntProperty
 
 from ...core.arguments import many
-from ..scene import color_range, patch_object, patch_record
+from ..scene import color_range, patch_object, patch_record, shown
 from ..scene.viewports import show_colors, shows_colors
 from ..touch import units
 from ..touch.settings import MOST_PLANES, length_property
@@ -211,6 +211,7 @@ class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
         found = probe.probe_of(context.view_layer.objects.active)
         target = found.tactile_probe.target
         patch_object.remove_objects([*patch_record.parts_of(probe.patch_of(found)), found])
+        shown.share_ranges()
         if target is not None:  # What comes next, as another pick, is about it.
             make_active(context, target)
         return {"FINISHED"}

@@ -75,7 +75,9 @@ def _automatic_range(record: Mapping[str, Any], common: float) -> float:
     """The range of a patch or whole object from its record, and from the common range of patches, or 0."""
     if not common:
         return float(max(record["own_limit"], record["error_limit"]))
-    return float(common if record["status"] == "uncertain" else max(common, record["own_limit"]))
+    # While the probe is dragged, the common range is that of where it was.
+    is_common = record["is_verified"] or record["status"] == "uncertain"
+    return float(common if is_common else max(common, record["own_limit"]))
 
 
 def least_gaussian_range(curvedness: Array, floor: float) -> float:
@@ -128,26 +130,49 @@ def settle(patch: Object) -> None:
 
 
 def share_range(patch: Object, others: list[Object] | None = None) -> None:
-    """Gives all patches of its mesh that show what a patch shows one range.
+    """Gives all patches of its mesh that show what a patch shows one range."""
+    others = _others(patch) if others is None else others
+    _share([patch, *(obj for obj in others if _group(obj) == _group(patch))])
 
-    It is the largest of those that are not in doubt, or of all if all are. If the patch that has it has a K
-    that is as good as 0, it is the largest that makes such a K pale.
+
+def share_ranges() -> None:
+    """Does so for all patches, because some have come or gone."""
+    groups: dict[Any, list[Object]] = {}
+    for obj in _others(None):
+        groups.setdefault(_group(obj), []).append(obj)
+    for patches in groups.values():
+        _share(patches)
+
+
+def _group(patch: Object) -> tuple[str, str]:
+    """What patches with one range have in common."""
+    return patch[RECORD]["source"], patch.tactile_colors
+
+
+def _share(patches: list[Object]) -> None:
+    """Gives patches one range: the largest of those that are not in doubt, or of all if all are.
+
+    If the patch that has it has a K that is as good as 0, it is the largest that makes such a K pale.
     """
-    same = [
-        obj
-        for obj in (_others(patch) if others is None else others)
-        if obj[RECORD]["source"] == patch[RECORD]["source"] and obj.tactile_colors == patch.tactile_colors
-    ]
-    records = [obj[RECORD] for obj in (patch, *same)]
-    sure = [record for record in records if record["status"] != "uncertain"]
-    largest = max(sure or records, key=lambda record: record.get("own_limit", 0.0))
-    common = largest.get("own_limit", 0.0)
+    records = [obj[RECORD] for obj in patches]
+    sure = [record for record in records if record["status"] != "uncertain"] or records
+    largest = _largest(sure, "own_limit")
     if largest.get("error_limit"):
-        common = max(record.get("error_limit", 0.0) for record in sure or records)
-    for obj in (patch, *same):
+        largest = _largest(sure, "error_limit")
+        common = largest["error_limit"]
+    else:
+        common = largest.get("own_limit", 0.0)
+    for obj in patches:
         if obj.get(COMMON_RANGE) != common:
             obj[COMMON_RANGE] = common
             recolor(obj)
+
+
+def _largest(records: list[Any], key: str) -> Any:
+    """The record with the largest range, if others have larger ones only on the share FEW of the area."""
+    ordered = sorted(records, key=lambda record: record.get(key, 0.0))
+    areas = np.cumsum([record["radius"] ** 2 for record in ordered])
+    return ordered[np.searchsorted(areas, (1.0 - colors.FEW) * areas[-1])]
 
 
 def _draw_above(patch: Object, others: list[Object]) -> None:
@@ -219,8 +244,8 @@ def _overlap(a: TouchReport, b: TouchReport) -> bool:
     return bool(alike > ALIKE and np.linalg.norm(apart) < a["radius"] + b["radius"])
 
 
-def _others(patch: Object) -> list[Object]:
-    """All other patches whose colors can be changed without a copy of their meshes."""
+def _others(patch: Object | None) -> list[Object]:
+    """All others, or all if `patch` is None, whose colors can be changed without a copy of their meshes."""
     return [
         obj
         for obj in all_objects()

@@ -3,24 +3,28 @@
 """How far a surface is off the mesh that was touched, and that mesh off the surface, all over their faces."""
 
 import math
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
+from typing import TypeAlias
 
 import numpy as np
 from mathutils.bvhtree import BVHTree
 
 from ... import core
 from ...core.steps import part_of
-from ...core.triangles import normalized, triangle_cross
+from ...core.triangles import middles_of_parts, normalized, triangle_cross
 from ..touch.detached_mesh import DetachedMesh
-from ..touch.types import Array
+from ..touch.types import Array, Point
 
 WITHIN = 0.05  # The mesh is looked for along the normal within this share of its size.
-PLACES, SEED = 10_000, 0  # The number of places on the mesh's faces, and the most vertices, to compare.
+PLACES, SEED = 10_000, 0  # The number of places on the faces of each, and the most vertices, to compare.
+STARTS = 12  # From so many of them the farthest place of all is looked for, as in `_climb`,
+MOVES = 20  # by so many moves, half as long after each that would lead back.
 AT_ONCE, BACK_AT_ONCE = 1000, 300  # The number of places of the surface, or of the mesh, for a step.
 FACES_AT_ONCE = 10_000  # The most faces in a tree, because making a larger one takes too long for a step.
 WAYS = 40  # A place is hidden if rays in this many directions all meet the mesh again.
 LIFT = 1e-4  # They begin this share of the size away from it.
+Nearest: TypeAlias = Callable[[Point], tuple[Point, float]]
 GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 
 
@@ -28,7 +32,7 @@ class BothWays:
     """The deviations of a surface from the mesh that was touched, and back, found step by step.
 
     deviation : (n,), signed distances of the surface from the mesh, positive outside it: of each vertex, or
-        of the middle of a face around it that is farther off, as both ends of a long edge may be on the mesh
+        of a place on a face around it that is farther off, as both ends of a long edge may be on the mesh
     mean : the mean distance of the surface from the mesh and of the mesh from the surface, by area
     within : the smaller share of both areas, of surface and mesh, that is within the tolerance of the other
     largest, place : the largest distance of either from the other, and where that is, (3,)
@@ -41,28 +45,34 @@ class BothWays:
         self._target, self._mesh, self._tolerance = target, mesh, tolerance
         self.deviation = np.zeros(len(mesh.vertices))
         self.mean, self.within, self.largest, self.place = 0.0, 1.0, 0.0, mesh.vertices[0]
+        self._trees: list[BVHTree] = []  # of the surface
+        self._apart = 0.0  # How far places are apart, about.
 
     def steps(self) -> Iterator[float]:
         """Does everything, as a generator that yields the share that is done."""
-        corners, triangles = self._mesh.vertices, self._mesh.triangles
-        normals = self._mesh.normals
+        vertices, corners = self._mesh.vertices, self._mesh.vertices[self._mesh.triangles]
         yield 0.0
-        yield from part_of(self._off_target(corners, normals, self.deviation), 0.0, 0.3)
-        across = triangle_cross(corners[triangles])
-        areas, middles = np.linalg.norm(across, axis=1), corners[triangles].mean(axis=1)
-        off = np.zeros(len(areas))
+        yield from part_of(self._off_target(vertices, self._mesh.normals, self.deviation), 0.0, 0.3)
+        across = triangle_cross(corners)
+        shares = middles_of_parts(max(round(math.sqrt(PLACES / len(corners))), 1))
+        middles = (shares @ corners).reshape(-1, 3)
+        off = np.zeros(len(middles))
         yield 0.3
-        yield from part_of(self._off_target(middles, normalized(across), off), 0.3, 0.7)
-        self._spread(off)
-        there, places = np.abs(off), self._places()
-        yield 0.7
-        trees = yield from self._trees()
-        back = []
-        for points in places:
-            off = yield from self._off_surface(points, trees)
-            back.append(off if len(off) else np.zeros(1))
-        self.mean = 0.5 * float(np.average(there, weights=areas) + back[0].mean())
-        near = np.average(there <= self._tolerance, weights=areas), (back[0] <= self._tolerance).mean()
+        normals = np.repeat(normalized(across), len(shares), axis=0)
+        yield from part_of(self._off_target(middles, normals, off), 0.3, 0.6)
+        self._spread(off.reshape(-1, len(shares)))
+        there, areas = np.abs(off), np.repeat(np.linalg.norm(across, axis=1), len(shares))
+        self._apart = math.sqrt(0.5 * float(areas.sum()) / PLACES)
+        yield 0.6
+        yield from self._make_trees()
+        yield from part_of(self._climb(middles, there, self._to_surface, self._to_mesh), 0.7, 0.8)
+        spread, corner = self._places()
+        felt, back = yield from self._off_surface(spread)
+        yield from self._off_surface(corner)
+        yield from part_of(self._climb(felt, back, self._to_mesh, self._to_seen), 0.8, 1.0)
+        back = back if len(back) else np.zeros(1)
+        self.mean = 0.5 * float(np.average(there, weights=areas) + back.mean())
+        near = np.average(there <= self._tolerance, weights=areas), (back <= self._tolerance).mean()
         self.within = float(min(near))
 
     def _off_target(self, points: Array, normals: Array, off: Array) -> Generator[float, None, None]:
@@ -81,7 +91,8 @@ class BothWays:
             yield start / len(points)
 
     def _spread(self, off: Array) -> None:
-        """Gives vertices the distances (m,) of the faces around them that are farther off than they are."""
+        """Gives vertices the largest of the distances (m, p) on faces around them, if these are larger."""
+        off = off[np.arange(len(off)), np.abs(off).argmax(axis=1)]
         order, around = np.argsort(np.abs(off)), np.zeros(len(self.deviation))
         around[self._mesh.triangles[order]] = off[order][:, None]  # The last, which is the largest, stays.
         farther = np.abs(around) > np.abs(self.deviation)
@@ -95,29 +106,72 @@ class BothWays:
             corners = rng.choice(corners, PLACES, replace=False)
         return core.scattered(target.points, target.triangles, PLACES, rng)[0], target.points[corners]
 
-    def _trees(self) -> Generator[float, None, list[BVHTree]]:
-        """Trees of the surface's faces, some in each; yields the share that is done."""
-        trees = []
+    def _make_trees(self) -> Iterator[float]:
+        """Makes trees of the surface's faces, some in each; yields the share that is done."""
         for start in range(0, len(self._mesh.triangles), FACES_AT_ONCE):
             used, index = np.unique(self._mesh.triangles[start : start + FACES_AT_ONCE], return_inverse=True)
             corners, faces = self._mesh.vertices[used].tolist(), index.reshape(-1, 3).tolist()
-            trees.append(BVHTree.FromPolygons(corners, faces, all_triangles=True))
+            self._trees.append(BVHTree.FromPolygons(corners, faces, all_triangles=True))
             yield 0.7
-        return trees
 
-    def _off_surface(self, points: Array, trees: list[BVHTree]) -> Generator[float, None, Array]:
-        """The distances of those points (n, 3) of the mesh that are not hidden; yields the share done."""
-        found = [np.zeros(0)]
+    def _off_surface(self, points: Array) -> Generator[float, None, tuple[Array, Array]]:
+        """Those points (n, 3) of the mesh that are not hidden, and how far they are off; yields the share."""
+        seen, found = [np.zeros((0, 3))], [np.zeros(0)]
         for start in range(0, len(points), BACK_AT_ONCE):
             some = points[start : start + BACK_AT_ONCE]
-            off = np.array([_nearest(trees, point) for point in some.tolist()])
+            off = np.array([self._to_surface(point)[1] for point in some.tolist()])
             yield 0.8
             far = (off > self._tolerance).tolist()
-            seen = np.array([not (far[i] and self._is_hidden(point)) for i, point in enumerate(some)])
-            self._note(some[seen], off[seen])
-            found.append(off[seen])
+            shown = np.array([not (far[i] and self._is_hidden(point)) for i, point in enumerate(some)])
+            seen.append(some[shown])
+            found.append(off[shown])
+            self._note(seen[-1], found[-1])
             yield 0.8
-        return np.concatenate(found)
+        return np.concatenate(seen), np.concatenate(found)
+
+    def _climb(
+        self, places: Array, off: Array, to_same: Nearest, to_other: Nearest
+    ) -> Generator[float, None, None]:
+        """Goes on from the farthest of places (n, 3), at distances (n,), to where it is farther still.
+
+        to_same, to_other : the nearest place on the surface of these places, or on the other, and its distance
+        """
+        for number, place in enumerate(places[np.argsort(off)[::-1][:STARTS]]):
+            ahead, best = self._apart, to_other(place.tolist())[1]
+            for _ in range(MOVES):
+                around = [to_same(beside)[0] for beside in (place + ahead * AXES).tolist()]
+                farther = [to_other(beside)[1] for beside in around]
+                if max(farther) > best:
+                    best = max(farther)
+                    place = np.array(around[farther.index(best)])
+                else:
+                    ahead *= 0.5
+            self._note(place[None], np.array([best]))
+            yield number / STARTS
+
+    def _to_mesh(self, point: Point) -> tuple[Point, float]:
+        """The place of the mesh nearest to a point, and its distance."""
+        try:
+            place, _, distance = self._target.project(point)
+        except ValueError:  # The nearest face has no area.
+            return point, 0.0
+        return place, distance
+
+    def _to_surface(self, point: Point) -> tuple[Point, float]:
+        """The place of the surface nearest to a point, and its distance."""
+        place, best = point, math.inf
+        for tree in self._trees:
+            found = tree.find_nearest(point) if best == math.inf else tree.find_nearest(point, best)
+            if found[3] is not None and found[3] < best:
+                place, best = found[0], found[3]
+        return place, best
+
+    def _to_seen(self, point: Point) -> tuple[Point, float]:
+        """The same from a place of the mesh; if that is hidden, the distance does not count and is 0."""
+        place, distance = self._to_surface(point)
+        if distance > self.largest and self._is_hidden(np.array(point)):
+            return place, 0.0
+        return place, distance
 
     def _is_hidden(self, point: Array) -> bool:
         """Whether rays from a place of the mesh meet it again in all directions."""
@@ -132,16 +186,6 @@ class BothWays:
             self.largest, self.place = float(off.max()), points[np.argmax(off)]
 
 
-def _nearest(trees: list[BVHTree], point: Sequence[float]) -> float:
-    """The distance of a point from the nearest face in trees."""
-    best = math.inf
-    for tree in trees:
-        found = tree.find_nearest(point) if best == math.inf else tree.find_nearest(point, best)
-        if found[3] is not None:
-            best = min(best, found[3])
-    return best
-
-
 def _directions() -> Array:
     """Unit vectors (WAYS, 3) all round."""
     z = 1.0 - (2.0 * np.arange(WAYS) + 1.0) / WAYS
@@ -150,3 +194,4 @@ def _directions() -> Array:
 
 
 DIRECTIONS = _directions()
+AXES = np.vstack([np.eye(3), -np.eye(3)])

@@ -187,8 +187,40 @@ def cubes():
     picture("millimeter")
 
 
+def ranges():
+    """The patch with the largest range is deleted, and comes back."""
+    ball = only(bpy.ops.mesh.primitive_uv_sphere_add, segments=64, ring_count=32, scale=(1.0, 1.0, 0.5))
+    look((0, 0, 0), (1, -1, 1), 4)
+    for place in ((0.0, 0.0, 0.5), (1.0, 0.0, 0.0)):
+        yield from pick(ball, place)
+        bpy.ops.ed.undo_push(message="Picked")
+    flat, rim = sorted(
+        (o for o in bpy.data.objects if "tactile" in o), key=lambda o: o["tactile"]["own_limit"]
+    )
+    common, name = rim["tactile"]["own_limit"], flat.name
+    check("two patches have one range", flat["tactile"]["color_limit"] == common, common)
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj == rim)
+    bpy.context.view_layer.objects.active = rim
+    bpy.ops.ed.undo_push(message="Select")
+    gui.xdo("mousemove", *ASIDE, "sleep", 0.3, "key", "x")
+    yield 1
+    gui.xdo("key", "Return")
+    yield 2
+    left = bpy.data.objects[name]["tactile"].to_dict()
+    check(
+        "... and X on one leaves the other its own", left["color_limit"] == left["own_limit"] < common, left
+    )
+    gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
+    yield 2
+    limits = [o["tactile"]["color_limit"] for o in bpy.data.objects if "tactile" in o]
+    check("... and Ctrl Z makes it one again", limits == [common] * 2, limits)
+    picture("ranges")
+
+
 def steps():
     yield from open_tab()
+    yield from ranges()
     yield from cubes()
     yield from facets()
     yield from forehead()

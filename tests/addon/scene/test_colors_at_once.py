@@ -109,6 +109,31 @@ def test_a_patch_in_doubt_has_the_range_of_those_that_are_sure(empty, ball):
     assert limit >= max(*own[1:], last["tactile"]["own_limit"])
 
 
+def test_a_tiny_patch_does_not_set_the_range_of_the_others(empty, ball):
+    wide, other = touch(empty, (0, 0, 1)), touch(empty, (0, 1, 0))
+    own = max(patch["tactile"]["own_limit"] for patch in (wide, other))
+    empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=0.1, location=(0, 0, 3))
+    for obj in (empty.context.object, ball):
+        obj.select_set(True)
+    empty.context.view_layer.objects.active = ball
+    empty.ops.object.join()
+    tiny = touch(empty, (0, 0, 3.1), extent=0.04)
+    assert tiny["tactile"]["status"] == "ok"
+    assert tiny["tactile"]["own_limit"] > 50.0 * own
+    assert [patch["tactile"]["color_limit"] for patch in (wide, other, tiny)] == [own] * 3
+
+
+def test_the_range_goes_with_the_patch_that_sets_it(empty, ball):
+    ball.scale = (1.0, 1.0, 0.5)
+    empty.context.view_layer.update()
+    flat = touch(empty, (0, 0, 0.5))
+    assert empty.ops.tactile.pick(target="Sphere", location=(1, 0, 0)) == {"FINISHED"}
+    (rim,) = empty.context.object.children
+    assert flat["tactile"]["color_limit"] == rim["tactile"]["own_limit"] > 2.0 * flat["tactile"]["own_limit"]
+    assert empty.ops.tactile.delete() == {"FINISHED"}
+    assert flat["tactile"]["color_limit"] == flat["tactile"]["own_limit"]
+
+
 def test_patches_over_each_other_do_not_flicker(empty, ball):
     """The second is drawn above the first, but not where it is rendered or exported."""
     first, second = touch(empty, (0, 0, 1)), touch(empty, (0.1, 0, 0.995))

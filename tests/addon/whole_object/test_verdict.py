@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+from mathutils.bvhtree import BVHTree
 from scenes import made, positions, values
 
-from core import Mesh
+from core import Mesh, scattered
 
 OK = "The object was felt everywhere a finger could reach."
 TETRAHEDRON = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], dtype=float)
@@ -182,6 +183,27 @@ def test_a_whole_object_of_facets_says_that_its_curvature_is_theirs(empty, exten
     assert [(m.type, m.levels) for m in source.modifiers] == [("SUBSURF", 3)]
     empty.context.view_layer.objects.active = source
     assert report.facets(touched(empty, most=4)[1]) is None
+
+
+@pytest.mark.long
+def test_no_place_is_farther_off_than_is_said(empty, touches_of):
+    """Neither of the surface, whose edges are long here, nor of the mesh. The share within is right, too."""
+    empty.ops.mesh.primitive_cone_add()
+    touches = touches_of(empty.context.object, tolerance=0.02, edge=0.25)
+    for _ in touches.steps():
+        pass
+    compared, target, mesh = touches.compared, touches.surface, touches.whole.mesh
+    places, _ = scattered(mesh.vertices, mesh.triangles, 50_000, np.random.default_rng(1))
+    off = np.array([target.project(place)[2] for place in places.tolist()])
+    tree = BVHTree.FromPolygons(mesh.vertices.tolist(), mesh.triangles.tolist(), all_triangles=True)
+    others, _ = scattered(target.points, target.triangles, 50_000, np.random.default_rng(2))
+    back = np.array([tree.find_nearest(place)[3] for place in others.tolist()])
+    assert max(off.max(), back.max()) <= compared.largest < 1.05 * max(off.max(), back.max())
+    ends = target.project(compared.place)[2], tree.find_nearest(compared.place)[3]
+    assert max(ends) == pytest.approx(compared.largest, rel=1e-6)
+    within = min((off <= 0.02).mean(), (back <= 0.02).mean())
+    assert compared.within == pytest.approx(within, abs=0.01)
+    assert compared.mean == pytest.approx(0.5 * (off.mean() + back.mean()), rel=0.02)
 
 
 @pytest.mark.long
