@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils.bvhtree import BVHTree
 
 from ... import core
 from ..touch.arrays import read_array
@@ -16,7 +17,7 @@ from . import colors
 from .attributes import COLOR, CURVATURE_STD, CURVATURES, DEVIATION, GAUSSIAN_STD, POSITION
 from .contour_mesh import HIGHEST
 from .family import all_objects
-from .mesh_data import ABOVE, own_mesh, values
+from .mesh_data import ABOVE, corners_of, own_mesh, values
 from .patch_record import (
     ATLAS_RECORD,
     COMMON_RANGE,
@@ -38,11 +39,10 @@ LAYER = "tactile_layer"  # A patch's number among those that overlap; 0 is the l
 ABOVE_OTHERS = "Above Other Patches"  # The modifier that draws it above those with lower numbers,
 APART = 2.0  # by this multiple of the deviations of the heights of both,
 LEAST_LAYER, MOST_LAYER = 3e-3, 3e-2  # and by no less and no more than these shares of its radius,
-MOST_BELOW = 6e-2  # but by as much as it is below its mesh, up to this share.
+MOST_FURTHER = 0.12  # and further, by up to this share, where it would be below the other.
 HIDDEN = 1.2 * HIGHEST  # A patch is so far above another, in radii of that, that its contours do not show.
 # Patches overlap only if the cosine between their normals is more; that of two walls of a block is 0.
 ALIKE = 0.1
-STEEP = 0.7  # At a rim that is steep by 54 degrees this share of a height more is needed.
 
 
 def recolor(obj: Object) -> None:
@@ -184,7 +184,7 @@ def _draw_above(patch: Object, others: list[Object]) -> None:
     for obj in (patch, *sorted(higher, key=lambda each: each[LAYER])):
         below = [each for each in (patch, *others) if each.get(LAYER, 0) < obj[LAYER]]
         below = [each for each in below if _overlap(obj[RECORD], each[RECORD])]
-        height = max((_height_above(obj, each) for each in below), default=_above_surfaces(obj))
+        height = _height_above(obj, below) if below else _above_surfaces(obj)
         for part in parts_of(obj):
             _lift(part, height)
 
@@ -211,17 +211,37 @@ def _apart(upper: Mapping[str, Any], lower: Mapping[str, Any]) -> float:
     return float(min(max(apart, LEAST_LAYER * radius), MOST_LAYER * radius))
 
 
-def _height_above(upper: Object, lower: Object) -> float:
-    """How high a patch is drawn above another: by more than both may be off, as two in one place flicker."""
-    layer = max(_apart(upper[RECORD], lower[RECORD]), HIDDEN * lower[RECORD]["radius"])
-    layer = max(layer, min(upper.get(ABOVE, 0.0), MOST_BELOW * upper[RECORD]["radius"]))
+def _height_above(upper: Object, below: list[Object]) -> float:
+    """How high a patch is drawn above others: by more than both may be off, as two in one place flicker."""
+    further, found = MOST_FURTHER * upper[RECORD]["radius"], 0.0
+    heights = [(_height_of(lower, upper), lower) for lower in below]
+    for height, lower in sorted(heights, key=lambda each: -each[0]):
+        layer = max(_apart(upper[RECORD], lower[RECORD]), HIDDEN * lower[RECORD]["radius"])
+        if height + further + layer > found:
+            reach = min(_reach(lower, height, upper), height + further)
+            found = max(found, max(height, reach) + layer)
+    return found
+
+
+def _height_of(lower: Object, upper: Object) -> float:
+    """How much higher a patch is drawn than another above it, which Eevee draws above the mesh as well."""
     modifier = lower.modifiers.get(ABOVE_OTHERS)
     height = 0.0 if modifier is None else modifier.strength
-    # It goes up along its own normal, which at a steep rim is less along that of the lower one.
-    further = min(STEEP * height, layer)
-    # Eevee draws each of them above the mesh as well, the lower one perhaps by more.
-    further += max(lower.get(ABOVE, 0.0) - upper.get(ABOVE, 0.0), 0.0)
-    return height + layer + further
+    return height + max(lower.get(ABOVE, 0.0) - upper.get(ABOVE, 0.0), 0.0)
+
+
+def _reach(lower: Object, height: float, upper: Object) -> float:
+    """How far a patch that is drawn at this height is above vertices of another, along the normal of that."""
+    matrix = np.array(upper.matrix_world.inverted_safe() @ lower.matrix_world)
+    corners = read_array(lower.data.vertices, "co", 3) + np.array([0.0, 0.0, height])
+    corners = corners @ matrix[:3, :3].T + matrix[:3, 3]
+    tree = BVHTree.FromPolygons(corners.tolist(), corners_of(lower.data).tolist(), all_triangles=True)
+    top, reach = float(corners[:, 2].max()) + height, 0.0
+    for x, y, z in read_array(upper.data.vertices, "co", 3).tolist():
+        place = tree.ray_cast((x, y, top), (0.0, 0.0, -1.0))[0]
+        if place is not None:
+            reach = max(reach, place.z - z)
+    return reach
 
 
 def _lift(obj: Object, height: float) -> None:

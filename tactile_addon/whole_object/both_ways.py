@@ -134,7 +134,7 @@ class BothWays:
     ) -> Generator[float, None, None]:
         """Goes on from the farthest of places (n, 3), at distances (n,), to where it is farther still.
 
-        to_same, to_other : the nearest place on the surface of these places, or on the other, and its distance
+        to_same, to_other : the nearest place on their own surface, or on the other, and its distance
         """
         for number, place in enumerate(places[np.argsort(off)[::-1][:STARTS]]):
             ahead, best = self._apart, to_other(place.tolist())[1]

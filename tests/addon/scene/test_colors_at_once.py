@@ -196,6 +196,16 @@ def test_patches_that_differ_by_their_errors_do_not_run_through_each_other(empty
     assert lines.modifiers[0].strength == touches[1].modifiers[0].strength > 0.0
 
 
+def test_four_wide_patches_of_a_cylinder_do_not_run_through_each_other(empty):
+    """They go around a quarter of it, so that each is steep where it is above another."""
+    empty.ops.mesh.primitive_cylinder_add()
+    empty.context.object.name = "Sphere"
+    turns, heights = (2.0271, 2.2670, 2.3562, 1.9635), (-0.1137, -0.0509, 0.5948, 0.5672)
+    places = ((math.cos(turn), math.sin(turn), height) for turn, height in zip(turns, heights, strict=True))
+    touches = [touch(empty, place, extent=0.0) for place in places]
+    assert all(is_above(empty, upper, lower) for lower, upper in itertools.combinations(touches, 2))
+
+
 def test_patches_around_a_bend_do_not_run_through_each_other(empty):
     """Their normals differ by up to 79 degrees."""
     empty.ops.mesh.primitive_torus_add()
