@@ -3,7 +3,7 @@
 """Whether the curvature of a touch is that of the facets it has felt, not of the shape they stand for."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from typing import NamedTuple
 
@@ -20,6 +20,8 @@ SPAN = 2.0  # which follows from how facets turn within this many widths, and th
 DISTINCT_COSINE, SMOOTH_COSINE = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))
 # if both facets have this share of the wider one's width, and of the radius; else one is a fillet.
 MIN_WIDTH_RATIO = 0.25
+# On fewer facets than this, of different normals, half of the radius suffices: a touch along a cone is long.
+FEW, PARALLEL_COSINE = 8, math.cos(math.radians(0.1))
 NEIGHBOR_STEP = 0.05  # The facet behind an edge is looked for this share of the width beyond it.
 
 
@@ -36,8 +38,8 @@ def has_few_facets(
 ) -> bool:
     """Whether a facet at the point, which stands for a smooth shape, has other curvatures than that shape.
 
-    The curvatures of the shape are those by which normals turn from facet to facet. A mesh whose facets are
-    narrow, compared with the radius, is fine.
+    The curvatures of the shape are those by which normals turn from facet to facet. A mesh is fine if the
+    contacts lie on many facets, and these are narrow compared with the radius.
 
     face_near : the number of the face nearest to a point (3,) of the world
     corners_of : the corners (k, 3) of a face in the world, in order
@@ -45,15 +47,17 @@ def has_few_facets(
     Facets whose edges are all sharp, as those of a cube, are the shape itself.
     """
     shape = cache(lambda face: _facet(corners_of(face)))
-    width = shape(face_near(r.frame.origin)).width
-    if width < MIN_WIDTH_RATIO * r.radius:  # The mesh is fine.
-        return False
-    points = np.vstack([contour.points for contour in r.contours]) - r.frame.origin
+    width, radius = shape(face_near(r.frame.origin)).width, r.radius
+    points = np.vstack([contour.points for contour in r.contours])
+    if width < MIN_WIDTH_RATIO * radius:
+        if not _are_few(shape(face_near(point)) for point in points):
+            return False
+        radius *= 0.5
     # Where facets narrow, as near the tip of a cone, their widths would reach around it and beyond the tip.
     reach = 1.0 / max(abs(r.k1), abs(r.k2), 1.0 / (SPAN * width))
-    points = r.frame.origin + reach / r.radius * points
+    points = r.frame.origin + reach / r.radius * (points - r.frame.origin)
     faces = [face_near(point) for point in points]
-    around, wide = map(shape, set(faces)), max(width, r.radius)
+    around, wide = map(shape, set(faces)), max(width, radius)
     if not any(_is_smooth(facet, wide, lambda at: shape(face_near(at))) for facet in around):
         return False
     turning = _turning(r, points, [shape(face) for face in faces])
@@ -70,6 +74,17 @@ def is_beside_bend(
     """
     facet = _facet(corners_of(face_near(point)))
     return _is_smooth(facet, 0.0, lambda at: _facet(corners_of(face_near(at))))
+
+
+def _are_few(facets: Iterable[Facet]) -> bool:
+    """Whether facets have fewer than FEW different normals."""
+    normals: list[Array] = []
+    for facet in facets:
+        if all(facet.normal @ normal < PARALLEL_COSINE for normal in normals):
+            normals.append(facet.normal)
+        if len(normals) == FEW:
+            return False
+    return True
 
 
 def _turning(r: Reconstruction, points: Array, facets: list[Facet]) -> Array:

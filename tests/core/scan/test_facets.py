@@ -218,6 +218,23 @@ def test_facets_that_narrow_toward_the_tip_of_a_cone_are_fine_there(z):
     assert not core.has_few_facets(r, mesh.face_near, mesh.corners_of)
 
 
+def test_few_long_facets_are_felt_at_the_base_of_a_cone():
+    """A touch there is as long as six of them are wide, and may have the curvature of a few."""
+    mesh, wrong, called = cone(32), 0, 0
+    for number in range(24):
+        z, turn = -1.0 + 0.08 * (number + 0.5) / 24, 2.4 * number
+        out = np.array([math.cos(turn), math.sin(turn), 0.0])
+        point, normal = mesh.ray_cast(tuple(2.0 * out + (0.0, 0.0, z)), tuple(-out), 3.0)
+        r = core.explore(mesh, point, normal, farthest=0.5625).result
+        exact = np.array([-4.0 / math.sqrt(5.0) / (1.0 - z), 0.0])
+        few = core.has_few_facets(r, mesh.face_near, mesh.corners_of)
+        called += few
+        off = np.abs(np.sort([r.k1, r.k2]) - exact).max()
+        wrong += r.status == "ok" and off > -0.25 * exact[0] and not few
+    assert called < 12
+    assert wrong == 0
+
+
 def test_a_flat_face_between_sharp_edges_is_the_shape():
     assert not has_few(Prism([(-1.0, -1.0), (-0.99, 0.0), (0.99, 0.0), (1.0, -1.0)]), 0.5)
     assert not has_few(Prism([(-1.0, 0.0), (-0.3, 0.0), (0.2, 0.0), (1.0, 0.0)]), 0.5)
