@@ -93,7 +93,8 @@ class Verification:
         if height is not None:
             record["height_error"] = height
         if record["status"] != "outdated":
-            mean = max(self._found.get("vertex_distance_mean", 0.0), height or 0.0)
+            # A coarse mesh has few vertices over the patch, and these may be at its rim.
+            mean = self._found.get("vertex_distance_mean", 0.0) if height is None else height
             # Another mesh, as a scan, may show only a part of the object.
             missing = self._error.missing if record["source"] == self.target else 0.0
             error = core.MeshError(mean, missing)

@@ -227,10 +227,23 @@ def test_a_mesh_that_contradicts_the_patch_is_a_doubt_with_a_warning(empty, patc
     ball.data.update()
     found = verified(empty, patch)
     assert patch["tactile"]["status"] == "uncertain"
+    assert patch["tactile"]["height_error"] == pytest.approx(found["vertex_distance_mean"], rel=0.2)
     message = patch["tactile"]["message"]
-    share = 100.0 * found["vertex_distance_mean"] / patch["tactile"]["radius"]
+    share = 100.0 * patch["tactile"]["height_error"] / patch["tactile"]["radius"]
     assert message.startswith(f"The mesh is {share:.3g} % of the radius off the patch on average")
     assert f"Warning: {message}" in capfd.readouterr().out
+
+
+def test_the_few_vertices_of_a_coarse_mesh_do_not_change_a_good_verdict(empty):
+    """Two are over the patch, at its rim, where it is off by more than twice as much as on average."""
+    empty.ops.mesh.primitive_cylinder_add()
+    assert empty.ops.tactile.reconstruct(location=(0.9, -0.4, -0.1)) == {"FINISHED"}
+    patch = empty.context.object
+    found = verified(empty, patch)
+    assert found["vertices"] == 2
+    assert found["vertex_distance_mean"] > 2.0 * patch["tactile"]["height_std"]
+    assert patch["tactile"]["height_error"] < patch["tactile"]["height_std"]
+    assert patch["tactile"]["status"] == "ok"
 
 
 def test_a_probes_patch_by_the_probe_and_until_it_is_touched_again(empty):
