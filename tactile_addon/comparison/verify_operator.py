@@ -86,7 +86,7 @@ class Verification:
         mesh_data.own_mesh(patch)
         mesh_data.write(patch.data, attributes.DEVIATION, deviations)
         shown.recolor(patch)
-        shown.share_range(patch)
+        shown.share_ranges()
         farthest = float(np.abs(deviations).max())
         record["verification"] = {"target": self.target, **self._found, "patch_distance_max": farthest}
         height = self._error.height

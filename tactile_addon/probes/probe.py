@@ -225,7 +225,7 @@ def _show(obj: Object) -> None:
     if obj.is_editable and patch_record.is_colored(obj):  # If not, verifying and exporting say so.
         shown.recolor(obj)
         if patch_record.RECORD in obj:
-            shown.share_range(obj)
+            shown.share_ranges()
 
 
 def _show_contours(patch: Object, shown: bool) -> None:

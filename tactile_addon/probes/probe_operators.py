@@ -211,7 +211,7 @@ class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
         found = probe.probe_of(context.view_layer.objects.active)
         target = found.tactile_probe.target
         patch_object.remove_objects([*patch_record.parts_of(probe.patch_of(found)), found])
-        shown.share_ranges()
+        shown.settle_all()
         if target is not None:  # What comes next, as another pick, is about it.
             make_active(context, target)
         return {"FINISHED"}

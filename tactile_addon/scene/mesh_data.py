@@ -14,7 +14,8 @@ from .attributes import DOMAIN, KEYS, POSITION, TYPES, attribute_of
 from .undo import note_copied
 
 ABOVE_MESH = "Above the Mesh"  # The modifier that draws an object above the mesh in which it lies.
-ABOVE = "tactile_above"  # A custom property of objects: how far above its mesh it is drawn.
+ABOVE = "tactile_above"  # A custom property of objects: how far above its mesh it is drawn, and for patches
+OWN_ABOVE = "tactile_own_above"  # how far if it were not above another, which is drawn so far above the mesh.
 
 
 def fill(

@@ -17,7 +17,7 @@ from . import colors
 from .attributes import COLOR, CURVATURE_STD, CURVATURES, DEVIATION, GAUSSIAN_STD, POSITION
 from .contour_mesh import HIGHEST
 from .family import all_objects
-from .mesh_data import ABOVE, corners_of, own_mesh, values
+from .mesh_data import ABOVE, OWN_ABOVE, corners_of, own_mesh, values
 from .patch_record import (
     ATLAS_RECORD,
     COMMON_RANGE,
@@ -32,6 +32,8 @@ from .patch_record import (
 LEAST_RANGE = 1e-3
 LEAST_BEND = 1e-2  # for curvatures in units of the size of the object, as all patches of a mesh have it,
 # and for deviations of a whole object the tolerance.
+TINY = 0.1  # A patch sets the range of others if patches with no smaller one have more than this share of
+# the area of all.
 PALE = 0.05  # Values below this share of the range are pale.
 LEAST_SHARE = 0.5  # That of K is no smaller than this share of the median curvedness, squared,
 ERROR_SHARE = 8.0  # or than this one where K may be 0 all over the patch.
@@ -72,12 +74,16 @@ def recolor(obj: Object) -> None:
 
 
 def _automatic_range(record: Mapping[str, Any], common: float) -> float:
-    """The range of a patch or whole object from its record, and from the common range of patches, or 0."""
+    """The range of a patch or whole object from its record, and from the common range of patches, or 0.
+
+    A tiny patch whose K is as good as 0 stays pale.
+    """
     if not common:
         return float(max(record["own_limit"], record["error_limit"]))
+    if record["status"] == "uncertain":
+        return float(common)
     # While the probe is dragged, the common range is that of where it was.
-    is_common = record["is_verified"] or record["status"] == "uncertain"
-    return float(common if is_common else max(common, record["own_limit"]))
+    return float(max(common, record["error_limit" if record["is_verified"] else "own_limit"]))
 
 
 def least_gaussian_range(curvedness: Array, floor: float) -> float:
@@ -125,23 +131,29 @@ def _corners_shown(mesh: bpy.types.Mesh, unknown: Any, edge: float) -> Array:
 def settle(patch: Object) -> None:
     """Gives a patch one range of colors with others of its mesh, and draws it above those it overlaps."""
     others = _others(patch)
-    share_range(patch, others)
+    _share([patch, *(obj for obj in others if _group(obj) == _group(patch))])
     _draw_above(patch, others)
 
 
-def share_range(patch: Object, others: list[Object] | None = None) -> None:
-    """Gives all patches of its mesh that show what a patch shows one range."""
-    others = _others(patch) if others is None else others
-    _share([patch, *(obj for obj in others if _group(obj) == _group(patch))])
-
-
 def share_ranges() -> None:
-    """Does so for all patches, because some have come or gone."""
+    """Gives all patches of a mesh that show the same one range, because one may show something else now."""
     groups: dict[Any, list[Object]] = {}
     for obj in _others(None):
         groups.setdefault(_group(obj), []).append(obj)
     for patches in groups.values():
         _share(patches)
+
+
+def settle_all() -> None:
+    """Does for all patches what `settle` does for one, because some may have come or gone."""
+    share_ranges()
+    patches = _others(None)
+    origins = np.array([patch[RECORD]["frame"]["origin"] for patch in patches])
+    radii = np.array([patch[RECORD]["radius"] for patch in patches])
+    for i in np.argsort([_layer(patch) for patch in patches], kind="stable"):
+        near = np.flatnonzero(np.linalg.norm(origins - origins[i], axis=1) < radii + radii[i])
+        if _layer(patches[i]) != _lowest_layer(patches[i], [patches[j] for j in near if j != i]):
+            _draw_above(patches[i], [patch for patch in patches if patch != patches[i]])
 
 
 def _group(patch: Object) -> tuple[str, str]:
@@ -156,12 +168,12 @@ def _share(patches: list[Object]) -> None:
     """
     records = [obj[RECORD] for obj in patches]
     sure = [record for record in records if record["status"] != "uncertain"] or records
-    largest = _largest(sure, "own_limit")
-    if largest.get("error_limit"):
-        largest = _largest(sure, "error_limit")
-        common = largest["error_limit"]
+    if all(record.get("error_limit") for record in sure):
+        common = max(record["error_limit"] for record in sure)
     else:
-        common = largest.get("own_limit", 0.0)
+        largest = _largest(sure, "own_limit")
+        key = "error_limit" if largest.get("error_limit") else "own_limit"
+        common = _largest(sure, key).get(key, 0.0)
     for obj in patches:
         if obj.get(COMMON_RANGE) != common:
             obj[COMMON_RANGE] = common
@@ -169,24 +181,35 @@ def _share(patches: list[Object]) -> None:
 
 
 def _largest(records: list[Any], key: str) -> Any:
-    """The record with the largest range, if others have larger ones only on the share FEW of the area."""
+    """The record with the largest range, if others have larger ones only on the share TINY of the area."""
     ordered = sorted(records, key=lambda record: record.get(key, 0.0))
     areas = np.cumsum([record["radius"] ** 2 for record in ordered])
-    return ordered[np.searchsorted(areas, (1.0 - colors.FEW) * areas[-1])]
+    return ordered[np.searchsorted(areas, (1.0 - TINY) * areas[-1])]
 
 
 def _draw_above(patch: Object, others: list[Object]) -> None:
     """Draws a patch above those that it overlaps, by a modifier that rendering and most exports leave out."""
-    over = [obj for obj in others if _overlap(patch[RECORD], obj[RECORD])]
-    taken = {obj.get(LAYER, 0) for obj in over}
-    patch[LAYER] = next(number for number in range(len(taken) + 1) if number not in taken)
-    higher = [obj for obj in over if obj.get(LAYER, 0) > patch[LAYER]]
+    patch[LAYER] = _lowest_layer(patch, others)
+    higher = [obj for obj in others if _layer(obj) > patch[LAYER]]
+    higher = [obj for obj in higher if _overlap(patch[RECORD], obj[RECORD])]
     for obj in (patch, *sorted(higher, key=lambda each: each[LAYER])):
-        below = [each for each in (patch, *others) if each.get(LAYER, 0) < obj[LAYER]]
+        below = [each for each in (patch, *others) if _layer(each) < _layer(obj)]
         below = [each for each in below if _overlap(obj[RECORD], each[RECORD])]
         height = _height_above(obj, below) if below else _above_surfaces(obj)
+        above = max([obj.get(OWN_ABOVE, 0.0), *(each.get(ABOVE, 0.0) for each in below)])
         for part in parts_of(obj):
             _lift(part, height)
+            part[ABOVE] = above
+
+
+def _layer(patch: Object) -> int:
+    return int(patch.get(LAYER, 0))
+
+
+def _lowest_layer(patch: Object, others: list[Object]) -> int:
+    """The lowest number of a layer that no patch over or below has."""
+    taken = {_layer(obj) for obj in others if _overlap(patch[RECORD], obj[RECORD])}
+    return next(number for number in range(len(taken) + 1) if number not in taken)
 
 
 def settle_on(surface: Object) -> None:
@@ -214,20 +237,14 @@ def _apart(upper: Mapping[str, Any], lower: Mapping[str, Any]) -> float:
 def _height_above(upper: Object, below: list[Object]) -> float:
     """How high a patch is drawn above others: by more than both may be off, as two in one place flicker."""
     further, found = MOST_FURTHER * upper[RECORD]["radius"], 0.0
-    heights = [(_height_of(lower, upper), lower) for lower in below]
+    modifiers = [(lower.modifiers.get(ABOVE_OTHERS), lower) for lower in below]
+    heights = [(0.0 if modifier is None else modifier.strength, lower) for modifier, lower in modifiers]
     for height, lower in sorted(heights, key=lambda each: -each[0]):
         layer = max(_apart(upper[RECORD], lower[RECORD]), HIDDEN * lower[RECORD]["radius"])
         if height + further + layer > found:
             reach = min(_reach(lower, height, upper), height + further)
             found = max(found, max(height, reach) + layer)
     return found
-
-
-def _height_of(lower: Object, upper: Object) -> float:
-    """How much higher a patch is drawn than another above it, which Eevee draws above the mesh as well."""
-    modifier = lower.modifiers.get(ABOVE_OTHERS)
-    height = 0.0 if modifier is None else modifier.strength
-    return height + max(lower.get(ABOVE, 0.0) - upper.get(ABOVE, 0.0), 0.0)
 
 
 def _reach(lower: Object, height: float, upper: Object) -> float:

@@ -129,9 +129,29 @@ def test_the_range_goes_with_the_patch_that_sets_it(empty, ball):
     flat = touch(empty, (0, 0, 0.5))
     assert empty.ops.tactile.pick(target="Sphere", location=(1, 0, 0)) == {"FINISHED"}
     (rim,) = empty.context.object.children
-    assert flat["tactile"]["color_limit"] == rim["tactile"]["own_limit"] > 2.0 * flat["tactile"]["own_limit"]
+    own = flat["tactile"]["own_limit"]
+    assert flat["tactile"]["color_limit"] == rim["tactile"]["own_limit"] > 2.0 * own
+    rim.tactile_colors = "mean_curvature"
+    assert flat["tactile"]["color_limit"] == own
+    rim.tactile_colors = "gaussian_curvature"
+    assert flat["tactile"]["color_limit"] == rim["tactile"]["own_limit"] > 2.0 * own
     assert empty.ops.tactile.delete() == {"FINISHED"}
-    assert flat["tactile"]["color_limit"] == flat["tactile"]["own_limit"]
+    assert flat["tactile"]["color_limit"] == own
+
+
+def test_a_patch_is_no_longer_above_one_that_is_deleted(empty, ball):
+    picks = []
+    for place in ((0, 0, 1), (0.1, 0, 0.995), (0, 0.1, 0.995)):
+        assert empty.ops.tactile.pick(target="Sphere", location=place, new=True) == {"FINISHED"}
+        picks.append(empty.context.object)
+    first, *patches = (probe.children[0] for probe in picks)
+    assert [patch["tactile_layer"] for patch in (first, *patches)] == [0, 1, 2]
+    heights = [patch.modifiers[0].strength for patch in patches]
+    empty.context.view_layer.objects.active = picks[0]
+    assert empty.ops.tactile.delete() == {"FINISHED"}
+    assert [patch["tactile_layer"] for patch in patches] == [0, 1]
+    assert not patches[0].modifiers
+    assert 0.0 < patches[1].modifiers[0].strength < heights[1]
 
 
 def test_patches_over_each_other_do_not_flicker(empty, ball):
