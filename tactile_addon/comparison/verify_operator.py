@@ -23,6 +23,7 @@ from ..touch.types import Object, Outcome
 from .verification_wording import verification_summary
 
 VERTICES_AT_ONCE = 2000  # A step looks at this many vertices.
+VERTICES = "vertices", "vertex_distance_mean", "vertex_distance_max"  # What the report has of them, too.
 
 
 class Verification:
@@ -89,6 +90,8 @@ class Verification:
         shown.share_ranges()
         farthest = float(np.abs(deviations).max())
         record["verification"] = {"target": self.target, **self._found, "patch_distance_max": farthest}
+        if record["source"] == self.target:  # A touch compares with fewer of its vertices.
+            record.update({key: value for key, value in self._found.items() if key in VERTICES})
         height = self._error.height
         if height is not None:
             record["height_error"] = height

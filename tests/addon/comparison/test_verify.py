@@ -246,6 +246,16 @@ def test_the_few_vertices_of_a_coarse_mesh_do_not_change_a_good_verdict(empty):
     assert patch["tactile"]["status"] == "ok"
 
 
+def test_the_report_has_the_vertices_of_the_verification(empty, patch):
+    before = patch["tactile"]["vertex_distance_max"]
+    patch.location.z += 0.05
+    found = verified(empty, patch)
+    record = patch["tactile"].to_dict()
+    assert record["vertex_distance_max"] == found["vertex_distance_max"] > before + 0.02
+    assert record["vertex_distance_mean"] == found["vertex_distance_mean"]
+    assert record["vertices"] == found["vertices"]
+
+
 def test_a_probes_patch_by_the_probe_and_until_it_is_touched_again(empty):
     add_ball(empty)
     empty.ops.tactile.pick(target="Sphere", location=TOP, extent=0.6, new=True)
