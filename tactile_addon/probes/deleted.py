@@ -112,7 +112,7 @@ def _unused_meshes() -> list[bpy.types.Mesh]:
 def remove() -> float | None:
     """Removes the datablocks of what was deleted if nobody uses them; Blender calls it as a timer.
 
-    The patches that are left may have a smaller range then, and be above no other.
+    The patches that are left may have a smaller range then.
     """
     if has_gesture():
         return LATER
@@ -129,5 +129,5 @@ def remove() -> float | None:
         bpy.data.objects.remove(obj)
     patch_object.remove_meshes(_unused_meshes())
     with undo.after_step():
-        shown.settle_all()
+        shown.share_ranges()
     return None

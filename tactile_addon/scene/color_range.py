@@ -14,7 +14,7 @@ from ..touch.units import Unit
 from . import shown
 from .patch_record import ATLAS_RECORD, POWERS, RANGE, RECORD, is_colored, report_of
 
-LEAST_DRAWN, SMALL = 1e-2, 1e-6  # Ranges below the first are drawn in units of the second,
+LEAST_DRAWN, SMALL = 1e-3, 1e-6  # Ranges below the first are drawn in units of the second,
 MOST_DRAWN, LARGE = 1e5, 1e6  # and those above this one in units of that.
 
 

@@ -136,7 +136,7 @@ def settle(patch: Object) -> None:
 
 
 def share_ranges() -> None:
-    """Gives all patches of a mesh that show the same one range, because one may show something else now."""
+    """Gives all patches of a mesh that show the same one range, as one is gone or shows something else."""
     groups: dict[Any, list[Object]] = {}
     for obj in _others(None):
         groups.setdefault(_group(obj), []).append(obj)
@@ -145,7 +145,7 @@ def share_ranges() -> None:
 
 
 def settle_all() -> None:
-    """Does for all patches what `settle` does for one, because some may have come or gone."""
+    """Does for all patches what `settle` does for one, because one was deleted in the same step of undo."""
     share_ranges()
     patches = _others(None)
     origins = np.array([patch[RECORD]["frame"]["origin"] for patch in patches])
