@@ -32,8 +32,7 @@ from .patch_record import (
 LEAST_RANGE = 1e-3
 LEAST_BEND = 1e-2  # for curvatures in units of the size of the object, as all patches of a mesh have it,
 # and for deviations of a whole object the tolerance.
-TINY = 0.1  # A patch sets the range of others if patches with no smaller one have more than this share of
-# the area of all.
+TINY = 0.1  # Patches with more than this share of the area of all set the range of all.
 PALE = 0.05  # Values below this share of the range are pale.
 LEAST_SHARE = 0.5  # That of K is no smaller than this share of the median curvedness, squared,
 ERROR_SHARE = 8.0  # or than this one where K may be 0 all over the patch.
@@ -144,16 +143,11 @@ def share_ranges() -> None:
         _share(patches)
 
 
-def settle_all() -> None:
-    """Does for all patches what `settle` does for one, because one was deleted in the same step of undo."""
-    share_ranges()
-    patches = _others(None)
-    origins = np.array([patch[RECORD]["frame"]["origin"] for patch in patches])
-    radii = np.array([patch[RECORD]["radius"] for patch in patches])
-    for i in np.argsort([_layer(patch) for patch in patches], kind="stable"):
-        near = np.flatnonzero(np.linalg.norm(origins - origins[i], axis=1) < radii + radii[i])
-        if _layer(patches[i]) != _lowest_layer(patches[i], [patches[j] for j in near if j != i]):
-            _draw_above(patches[i], [patch for patch in patches if patch != patches[i]])
+def overlapped(patch: Object) -> list[Object]:
+    """All patches over or below a patch, the lowest first."""
+    if not is_colored(patch):
+        return []
+    return sorted((obj for obj in _others(patch) if _overlap(patch[RECORD], obj[RECORD])), key=_layer)
 
 
 def _group(patch: Object) -> tuple[str, str]:
@@ -253,7 +247,7 @@ def _reach(lower: Object, height: float, upper: Object) -> float:
     corners = read_array(lower.data.vertices, "co", 3) + np.array([0.0, 0.0, height])
     corners = corners @ matrix[:3, :3].T + matrix[:3, 3]
     tree = BVHTree.FromPolygons(corners.tolist(), corners_of(lower.data).tolist(), all_triangles=True)
-    top, reach = float(corners[:, 2].max()) + height, 0.0
+    top, reach = float(corners[:, 2].max()) + upper[RECORD]["radius"], 0.0
     for x, y, z in read_array(upper.data.vertices, "co", 3).tolist():
         place = tree.ray_cast((x, y, top), (0.0, 0.0, -1.0))[0]
         if place is not None:

@@ -24,8 +24,9 @@ AT_ONCE, BACK_AT_ONCE = 1000, 300  # The number of places of the surface, or of 
 FACES_AT_ONCE = 10_000  # The most faces in a tree, because making a larger one takes too long for a step.
 WAYS = 40  # A place is hidden if rays in this many directions all meet the mesh again.
 LIFT = 1e-4  # They begin this share of the size away from it.
-Nearest: TypeAlias = Callable[[Point], tuple[Point, float]]
 GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
+
+Nearest: TypeAlias = Callable[[Point], tuple[Point, float]]
 
 
 class BothWays:
@@ -167,7 +168,7 @@ class BothWays:
         return place, best
 
     def _to_seen(self, point: Point) -> tuple[Point, float]:
-        """The same from a place of the mesh; if that is hidden, the distance does not count and is 0."""
+        """The place of the surface nearest to one of the mesh, and its distance; 0 if that one is hidden."""
         place, distance = self._to_surface(point)
         if distance > self.largest and self._is_hidden(np.array(point)):
             return place, 0.0
