@@ -140,6 +140,8 @@ class Mesh:
 
     def ray_cast(self, origin, direction, distance):
         speeds, gaps = self.normals @ direction, self.offs - self.normals @ origin
+        if (gaps[speeds == 0.0] < 0.0).any():  # The ray is parallel to a face, outside of it.
+            return None
         with np.errstate(divide="ignore", invalid="ignore"):
             gone = gaps / speeds
         enters, leaves = gone[speeds < 0.0].max(initial=-np.inf), gone[speeds > 0.0].min(initial=np.inf)
