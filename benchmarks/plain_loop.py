@@ -13,7 +13,6 @@ from dataclasses import replace
 from time import perf_counter, process_time
 
 from cluster.data_set.options import Options
-from cluster.extension import core
 from cluster.worker import touches
 from cluster.worker.objects import touchable
 from tools import blender
@@ -27,7 +26,7 @@ def touch_all(files, options):
         for block in options.blocks():
             for _, _, found in touches.explored(target, options, block):
                 results = [each.result for each in found if not isinstance(each, ValueError)]
-                kept += [(r, r.status, r.message, core.mesh_error(r, target.surface).height) for r in results]
+                kept += [(r, r.status, r.message, r.taps.height) for r in results]
     return kept
 
 

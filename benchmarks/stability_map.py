@@ -46,7 +46,7 @@ def measure(bpy, clock, faces, spacing, extent):
         count = painted["tactile_map"]["touched"]
         bpy.data.objects.remove(painted)
     whole, spent = runs[[seconds for seconds, _ in runs].index(median_low([seconds for seconds, _ in runs]))]
-    parts = [spent["tracking"], spent["fit"] + spent["noting"] - spent["error"], spent["error"]]
+    parts = [spent["tracking"], spent["fit"] + spent["noting"], spent["taps"]]
     parts.append(whole - sum(parts) - spent["detached"])
     cells = [f"{1e3 * seconds / count:.2f}" for seconds in parts]
     return [
@@ -76,7 +76,7 @@ def main():
     ):
         clock.wrap(owner, name, stage)
     clock.wrap(addon.stability_map.stability.StabilityMap, "_note", "noting")
-    clock.wrap(addon.stability_map.stability.core, "mesh_error", "error")
+    clock.wrap(side_by_side, "tapped", "taps")
     columns = (
         "faces",
         "extent",
@@ -84,7 +84,7 @@ def main():
         "points/s",
         "tracking",
         "fit",
-        "error",
+        "taps",
         "thinning, paint",
         "once, s",
     )

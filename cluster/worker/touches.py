@@ -82,7 +82,7 @@ def _row(target: Touchable, found: Any) -> dict[str, Any]:
         "stops": [stop for c in contours for stop in c.stops],
         "extent": found.extent,
         "step": found.step,
-        "mesh_error": core.mesh_error(r, target.surface).height,
+        "mesh_error": r.taps.height,
     }
 
 

@@ -83,8 +83,8 @@ class ExplorationOptions:
 
     @property
     def is_tapped(self) -> bool:
-        """Whether the finger taps between the curves: only if shares of the radius choose their length."""
-        return self.extent is None and self.largest_std is None
+        """Whether the finger taps between the curves: only if shares of the radius judge the fit."""
+        return self.largest_std is None
 
 
 def _length(name: str, length: float | str | None) -> float | None:

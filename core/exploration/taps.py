@@ -58,16 +58,17 @@ def tapped(surface: Surface, r: Reconstruction) -> Tapped:
     missed, offs = np.isnan(offs), np.nan_to_num(offs)
     nodes = offs_at(r, surface, r.domain.nodes[0], side)
     within, missing = mean_error(r, nodes)
-    within = within or 0.0
     contradicts = (
         (offs > TOO_FAR_OFF * stds).any()
         or offs.mean() > CONTRADICTING * stds.mean()
-        or within > CONTRADICTING * r.mean_height_std
+        or (within or 0.0) > CONTRADICTING * r.mean_height_std
     )
-    off = max(float(offs.max()), within) / r.radius if contradicts else 0.0
+    off = max(float(offs.max()), within or 0.0) / r.radius if contradicts else 0.0
     gaps = r.domain.nodes[0][np.isnan(nodes) & (missing > LARGE_GAP)]
     contradicting = where[(offs > CONTRADICTING * stds) & contradicts]
-    return Tapped(Taps(len(offs), int(missed.sum()), off, missing), np.concatenate([contradicting, gaps]))
+    return Tapped(
+        Taps(len(offs), int(missed.sum()), off, missing, within), np.concatenate([contradicting, gaps])
+    )
 
 
 def adjacent_half_curves(r: Reconstruction, where: Array) -> NDArray[np.intp]:

@@ -47,8 +47,8 @@ def explore(
     farthest : greatest length of a half curve; None for no limit, if curves end by themselves
     largest_std : mean deviation of the height up to which half curves grow, and up to which they count as
       explained; they also end where the surface bends by 40 degrees. None for shares of the radius.
-      Then, if the extent is "auto", the finger also taps between the curves (taps.py): where the surface is
-      not that of the fit, they become shorter, or it is in doubt
+      Then the finger also taps between the curves (taps.py): where the surface is not that of the fit, it is
+      in doubt, or with the extent "auto" they become shorter
     tolerance : mean deviation of the height to reach: until then the plane that helps most is added, up to
         `most_planes`, as long as one takes a tenth off. None adds no planes
     extent : length of each half curve, as in `track`; with "auto" each grows until the default fit no

@@ -154,8 +154,14 @@ def _taps(d: Any) -> Taps | None:
     if d is None:
         return None
     taps, missed = (int(number(name, _of(d, name), least=0.0)) for name in ("number", "missed"))
-    off, missing = _of(d, "off"), d.get("missing", 0.0)
-    return Taps(taps, missed, number("off", off, least=0.0), number("missing", missing, least=0.0))
+    off, missing, height = _of(d, "off"), d.get("missing", 0.0), d.get("height")
+    return Taps(
+        taps,
+        missed,
+        number("off", off, least=0.0),
+        number("missing", missing, least=0.0),
+        None if height is None else number("height", height, least=0.0),
+    )
 
 
 def _posterior_dict(posterior: SurfacePosterior) -> dict[str, Any]:

@@ -47,12 +47,14 @@ class Taps(NamedTuple):
     missed : how often it met no surface within the radius
     off : the largest distance of the surface from the patch, in units of L, if taps contradict it; else 0
     missing : the share of the patch's area where there is no surface within the radius
+    height : the mean distance in height where there is surface, at the Gauss points of the domain, or None
     """
 
     number: int
     missed: int = 0
     off: float = 0.0
     missing: float = 0.0
+    height: float | None = None
 
 
 def doubt(r: Judged) -> tuple[str, str] | None:

@@ -184,14 +184,12 @@ class StabilityMap:
 
     def _note(self, number: int, touch: core.Exploration) -> None:
         result, surface = touch.result, self.surface
-        error = core.mesh_error(result, surface)
-        status, _ = core.judged_by_mesh(result, error)
         follows_facets = core.has_few_facets(result, surface.face_near, surface.corners_of)
         self.few_facets += follows_facets
-        is_sure = status == "ok" and not follows_facets
+        is_sure = result.status == "ok" and not follows_facets
         self.reason[number] = REASON_KEYS.index("patch" if is_sure else "doubt")
         self.measures[number] = (
-            NOTHING if error.height is None else error.height,
+            NOTHING if result.taps.height is None else result.taps.height,
             result.mean_height_std,
             touch.extent,
             result.condition_number,

@@ -20,7 +20,6 @@ from .surface import MeshSurface
 from .touch_report import (
     TouchReport,
     ends,
-    judgment,
     measures,
     reconstruction_report,
     suggestion_report,
@@ -145,7 +144,10 @@ def _explored(
 def _exploration_report(found: core.Exploration, given: int, ended: str, few_facets: bool) -> TouchReport:
     """The report of a touch whose first `given` planes were given; the rest as in `judgment`."""
     added = zip(found.planes[given:], found.stds, found.stds[1:], strict=False)
+    # Where vertices are many they would count more, and if faces are large, there may be none in a pocket.
+    height = found.result.taps.height
     return {
+        **({} if height is None else {"height_error": height}),
         "degree": found.result.patch.degree,
         "extent": found.extent,
         "step": found.step,
@@ -166,10 +168,6 @@ def completed(touched: Touched, most: int | None = None) -> Touched:
     """
     clock, result, report = [perf_counter()], touched.result, touched.report
     found = _verification_report(touched.surface, result, most)
-    # Where vertices are many they would count more, and if faces are large, there may be none in a pocket.
-    error = core.mesh_error(result, touched.surface)
-    found |= {} if error.height is None else {"height_error": error.height}
-    found |= judgment(result, error, report["ended"], report["few_facets"])
     clock.append(perf_counter())
     plane = suggestion_report(result, np.array(report["axes"]))
     clock.append(perf_counter())

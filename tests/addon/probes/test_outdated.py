@@ -99,7 +99,7 @@ def test_whatever_a_waiting_probe_has_not_felt_makes_its_patch_outdated(empty, b
     elif change == "scale":
         ball.scale = (1.1, 1.0, 1.0)
     else:
-        ball.data.vertices[0].co *= 1.01
+        ball.data.vertices[0].co *= 1.0001
         ball.data.update()
     empty.context.view_layer.update()
     assert said(probe) == ("outdated", STALE)
