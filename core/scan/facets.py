@@ -3,7 +3,7 @@
 """Whether the curvature of a touch is that of the facets it has felt, not of the shape they stand for."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ OTHER = 0.2  # Curvatures are those of a facet if they are off by this share of 
 SPAN = 2.0  # which follows from how facets turn within this many widths, and the radius of curvature.
 # Edges between these angles stand for a smooth bend,
 DISTINCT_COSINE, SMOOTH_COSINE = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))
-# if both facets have this share of the wider one's width, and of the radius; else one is a fillet.
+# if both facets have this share of the wider one's width across it, and of the radius; else one is a fillet.
 MIN_WIDTH_RATIO = 0.25
 # On fewer facets than this, of different normals, half of the radius suffices: a touch along a cone is long.
 FEW, PARALLEL_COSINE = 8, math.cos(math.radians(0.1))
@@ -26,11 +26,17 @@ NEIGHBOR_STEP = 0.05  # The facet behind an edge is looked for this share of the
 
 
 class Facet(NamedTuple):
-    """A face: its corners (k, 3), its unit normal, and its area over its longest edge."""
+    """A face: its corners (k, 3), its unit normal, and its area."""
 
     corners: Array
     normal: Array
-    width: float
+    area: float
+
+    def width(self, edge: Array) -> float:
+        """The mean width of the face across the direction of an edge (3,), a length."""
+        return (
+            self.area * float(np.linalg.norm(edge)) / float(np.ptp(self.corners @ edge)) if self.area else 0.0
+        )
 
 
 def has_few_facets(
@@ -47,10 +53,14 @@ def has_few_facets(
     Facets whose edges are all sharp, as those of a cube, are the shape itself.
     """
     shape = cache(lambda face: _facet(corners_of(face)))
-    width, radius = shape(face_near(r.frame.origin)).width, r.radius
+
+    def facet_near(at: Array) -> Facet:
+        return shape(face_near(at))
+
+    width, radius = _width(facet_near(r.frame.origin), facet_near), r.radius
     points = np.vstack([contour.points for contour in r.contours])
     if width < MIN_WIDTH_RATIO * radius:
-        if not _are_few(shape(face_near(point)) for point in points):
+        if not (width and _are_few(map(facet_near, points))):
             return False
         radius *= 0.5
     # Where facets narrow, as near the tip of a cone, their widths would reach around it and beyond the tip.
@@ -58,7 +68,7 @@ def has_few_facets(
     points = r.frame.origin + reach / r.radius * (points - r.frame.origin)
     faces = [face_near(point) for point in points]
     around, wide = map(shape, set(faces)), max(width, radius)
-    if not any(_is_smooth(facet, wide, lambda at: shape(face_near(at))) for facet in around):
+    if not any(_is_smooth(facet, wide, facet_near) for facet in around):
         return False
     turning = _turning(r, points, [shape(face) for face in faces])
     off = np.abs(turning - np.sort([r.k1, r.k2])).max()
@@ -104,28 +114,37 @@ def _turning(r: Reconstruction, points: Array, facets: list[Facet]) -> Array:
     return np.linalg.eigvalsh([[xx, xy], [xy, yy]])
 
 
-def _is_smooth(facet: Facet, radius: float, facet_near: Callable[[Array], Facet]) -> bool:
-    """Whether an edge of the facet stands for a smooth bend."""
+def _width(facet: Facet, facet_near: Callable[[Array], Facet]) -> float:
+    """The largest width of a facet across its smooth bends, or if it has none across its longest edge."""
+    edges = np.roll(facet.corners, -1, axis=0) - facet.corners
+    longest = edges[np.argmax((edges**2).sum(axis=1))]
+    return max(map(min, _bends(facet, facet_near)), default=facet.width(longest))
+
+
+def _bends(facet: Facet, facet_near: Callable[[Array], Facet]) -> Iterator[tuple[float, float]]:
+    """The widths of the facet and of its neighbor across each edge whose angle is that of a smooth bend."""
     starts, along = facet.corners, np.roll(facet.corners, -1, axis=0) - facet.corners
     outward = np.cross(along, facet.normal)
     for start, edge, out in zip(starts, along, outward, strict=True):
         if not np.any(out):
             continue
-        beyond = facet_near(start + 0.5 * edge + NEIGHBOR_STEP * facet.width * out / np.linalg.norm(out))
-        is_bend = SMOOTH_COSINE < float(facet.normal @ beyond.normal) < DISTINCT_COSINE
-        narrow, wide = sorted((facet.width, beyond.width))
-        if is_bend and narrow >= MIN_WIDTH_RATIO * max(wide, radius):
-            return True
-    return False
+        width = facet.width(edge)
+        beyond = facet_near(start + 0.5 * edge + NEIGHBOR_STEP * width * out / np.linalg.norm(out))
+        if SMOOTH_COSINE < float(facet.normal @ beyond.normal) < DISTINCT_COSINE:
+            yield width, beyond.width(edge)
+
+
+def _is_smooth(facet: Facet, radius: float, facet_near: Callable[[Array], Facet]) -> bool:
+    """Whether an edge of the facet stands for a smooth bend."""
+    return any(min(widths) >= MIN_WIDTH_RATIO * max(*widths, radius) for widths in _bends(facet, facet_near))
 
 
 def _facet(corners: ArrayLike) -> Facet:
-    """The face with these corners; its normal and width are 0 if it has no area."""
+    """The face with these corners; its normal and area are 0 if it has none."""
     points = np.asarray(corners, dtype=float)
     sides = points - points[0]
     across = np.cross(sides[1:-1], sides[2:]).sum(axis=0)
     twice = float(np.linalg.norm(across))
     if not twice:
         return Facet(points, across, 0.0)
-    longest = np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1).max()
-    return Facet(points, across / twice, 0.5 * twice / float(longest))
+    return Facet(points, across / twice, 0.5 * twice)

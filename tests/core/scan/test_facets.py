@@ -201,6 +201,33 @@ def test_the_curvature_of_a_ball_is_right_or_said_to_be_that_of_facets():
     assert wrong <= 2
 
 
+def uv_ball(segments, rings):
+    """Blender's ball of `segments` around its axis and `rings` from pole to pole."""
+    turns, tilts = 2.0 * math.pi / segments * np.arange(segments + 1), math.pi / rings * np.arange(rings + 1)
+    at = [[(math.sin(b) * math.cos(a), math.sin(b) * math.sin(a), math.cos(b)) for a in turns] for b in tilts]
+    faces = []
+    for upper, lower in itertools.pairwise(at):
+        for (a, b), (c, d) in zip(itertools.pairwise(upper), itertools.pairwise(lower), strict=True):
+            faces += [(a, c, d), (a, d, b)]
+    return Mesh([face for face in faces if np.linalg.norm(np.cross(*np.subtract(face[1:], face[0]))) > 1e-9])
+
+
+@pytest.mark.parametrize(("segments", "rings"), [(16, 64), (64, 12)])
+def test_facets_that_are_long_across_a_smooth_bend_are_felt(segments, rings):
+    """They are narrow in the other direction, in which a touch feels many of them."""
+    ball, rng = uv_ball(segments, rings), np.random.default_rng(1)
+    wrong = called = 0
+    for up in rng.normal(size=(8, 3)):
+        up /= np.linalg.norm(up)
+        point, normal = ball.ray_cast(tuple(2.0 * up), tuple(-up), 2.0)
+        r = core.explore(ball, point, normal).result
+        few = core.has_few_facets(r, ball.face_near, ball.corners_of)
+        called += few
+        wrong += r.status == "ok" and max(abs(r.k1 + 1.0), abs(r.k2 + 1.0)) > 0.25 and not few
+    assert called
+    assert wrong == 0
+
+
 def cone(segments):
     """Blender's cone, of radius 1 and height 2, around the origin."""
     angles = 2.0 * math.pi / segments * np.arange(segments + 1)
