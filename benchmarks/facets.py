@@ -29,14 +29,14 @@ BINS = (1, 2, 4, 6, 8, 10, 12, 16, 24, 40, math.inf)  # Each goes up to the next
 def shapes(bpy):
     """(adds the shape, the principal curvatures at a point of it)."""
     ball = (-1.0, -1.0)
-    for segments, rings in ((16, 8), (32, 16), (64, 32)):
+    for segments, rings in ((16, 8), (32, 16), (64, 32), (16, 64)):
         yield (
             lambda s=segments, r=rings: bpy.ops.mesh.primitive_uv_sphere_add(segments=s, ring_count=r),
             lambda _: ball,
         )
     for level in (2, 3, 4):
         yield lambda n=level: bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=n), lambda _: ball
-    for major, minor in ((48, 12), (96, 24), (192, 48)):
+    for major, minor in ((48, 12), (96, 24), (192, 48), (16, 48)):
         yield (
             lambda a=major, b=minor: bpy.ops.mesh.primitive_torus_add(major_segments=a, minor_segments=b),
             lambda p: sorted((-4.0, -4.0 * (1.0 - 1.0 / math.hypot(p[0], p[1])))),

@@ -36,7 +36,7 @@ def verification_summary(record: TouchReport) -> tuple[bool, str]:
     if record["status"] != "ok":
         return True, record["message"]
     unit = units.unit_of(bpy.context.scene, record["radius"])
-    mean, most = (_length(found, f"vertex_distance_{key}", unit) for key in ("mean", "max"))
+    mean, most = (_length(record, f"vertex_distance_{key}", unit) for key in ("mean", "max"))
     return False, (
         f'At {many(vertices, "vertex", "vertices")}, "{name}" is {mean} off the patch on average, '
         f"{most} at most; the mesh covers {percent:.0f} % of it"
@@ -54,12 +54,13 @@ def verification_columns(report: Mapping[str, Any]) -> list[tuple[str, Any]]:
     ]
 
 
-def verification_table(found: Mapping[str, Any], unit: Unit) -> list[tuple[str, ...]]:
+def verification_table(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, ...]]:
     """Rows of a label and the values for the mesh and for the contacts; lengths are without unit."""
+    found = record["verification"]
     symbol, bare = units.symbol(1, unit), ("", unit[1])
 
     def lengths(key: str) -> Iterator[str]:
-        return (_length(found, f"{what}_distance_{key}", bare) for what in ("vertex", "contact"))
+        return (_length(record, f"{what}_distance_{key}", bare) for what in ("vertex", "contact"))
 
     names = zip(("Mean", "Median", "Maximum", "RMS"), SPREAD, strict=True)
     return [
@@ -69,17 +70,19 @@ def verification_table(found: Mapping[str, Any], unit: Unit) -> list[tuple[str, 
     ]
 
 
-def verification_rows(found: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
+def verification_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     """(label, value) of everything else that a verification has found."""
+    found = record["verification"]
     return [
-        ("Error on Curves", _length(found, "fit_error", unit)),
-        (f"Error on {found['extra_contours']} More", _length(found, "extra_fit_error", unit)),
+        ("Error on Curves", _length(record, "fit_error", unit)),
+        (f"Error on {found['extra_contours']} More", _length(record, "extra_fit_error", unit)),
         ("Total |K|", f"{found['total_absolute_curvature']:.3g}"),
         ("Overlap", f"{100.0 * found['overlap']:.0f} %"),
-        ("Patch to Mesh", _length(found, "patch_distance_max", unit)),
+        ("Patch to Mesh", _length(record, "patch_distance_max", unit)),
     ]
 
 
-def _length(found: Mapping[str, Any], key: str, unit: Unit) -> str:
-    """A length in words, or a dash if a verification has not found it."""
-    return units.say(found[key], 1, unit) if key in found else "–"
+def _length(record: Mapping[str, Any], key: str, unit: Unit) -> str:
+    """A length in words, or a dash if the verification has not found it."""
+    found = record["verification"]
+    return units.say(units.rounded(found[key], 1, record["radius"]), 1, unit) if key in found else "–"

@@ -165,8 +165,10 @@ class TACTILE_OT_verify(InSlices, bpy.types.Operator):
 
     def _done(self) -> Progress:
         done, count = self._verification.done, self._verification.count
-        share, vertices = done / count if count else None, many(count, "vertex", "vertices")
-        return f'Comparing with "{self._verification.target}": {done} of {vertices}', share
+        words = f'Comparing with "{self._verification.target}"'
+        if not count:  # It has faces near the patch, but no vertices.
+            return words, None
+        return f"{words}: {done} of {many(count, 'vertex', 'vertices')}", done / count
 
     def _finish(self, context: bpy.types.Context) -> Outcome:
         record = self._verification.write()

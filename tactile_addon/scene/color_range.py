@@ -20,9 +20,8 @@ MOST_DRAWN, LARGE = 1e5, 1e6  # and those above this one in units of that.
 
 def unit_of_range(patch: Object, scene: bpy.types.Scene) -> tuple[int, Unit]:
     """The power of length in the quantity that a patch or whole object shows, and the unit of its legend."""
-    report = _record(patch)
-    unit = ("", 1.0) if report is None else units.unit_of_report(scene, report)
-    return POWERS[patch.tactile_colors], unit
+    report, power = _record(patch), POWERS[patch.tactile_colors]
+    return power, ("", 1.0) if report is None else units.unit_of_colors(scene, report, power)
 
 
 def share(patch: Object, patches: Iterable[Object]) -> int:

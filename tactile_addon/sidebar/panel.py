@@ -282,17 +282,17 @@ def _draw_comparison(
         draw_sentence(context, layout, registration_summary(record["registration"], unit), "SNAP_ON")
     if "verification" not in record:
         return
-    found, layout = record["verification"], layout.column()
+    layout = layout.column()
     layout.active = record["status"] != "outdated"
-    layout.label(text=found["target"], icon="MESH_DATA", translate=False)
+    layout.label(text=record["verification"]["target"], icon="MESH_DATA", translate=False)
     column = layout.column(align=True)
-    for label, *values in verification_table(found, unit):
+    for label, *values in verification_table(record, unit):
         row = column.row(align=True).split(factor=0.31, align=True)
         row.label(text=label)
         row = row.row(align=True)
         for value in values:
             row.label(text=value)
-    draw_rows(context, layout, verification_rows(found, unit))
+    draw_rows(context, layout, verification_rows(record, unit))
 
 
 PANELS = (TACTILE_PT_probe, TACTILE_PT_result, TACTILE_PT_object, TACTILE_PT_map)

@@ -13,7 +13,6 @@ from ..touch.units import Unit
 
 FLAT_DEVIATIONS = 2.0  # A curvature within this many deviations of 0 has no radius.
 FLATTEST = 1e-3  # Nor has one whose radius is a thousand times the patch's.
-ZERO = 1e-6  # A number below this, in unit radius, counts as 0.
 
 
 def main_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
@@ -86,8 +85,8 @@ def _measured(record: Mapping[str, Any], key: str, power: int, unit: Unit) -> st
 
 
 def _value(record: Mapping[str, Any], key: str, power: int) -> float:
-    """A value of the record, which is in length^power; what single precision leaves of 0 is 0."""
-    return record[key] if abs(record[key]) > ZERO * record["radius"] ** power else 0.0
+    """A value of the record, which is in length^power, as `units.rounded` has it."""
+    return units.rounded(record[key], power, record["radius"])
 
 
 def _radii(record: Mapping[str, Any], unit: Unit) -> Iterator[tuple[str, str]]:

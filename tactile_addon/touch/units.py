@@ -19,6 +19,7 @@ ADAPTIVE = {
 METERS = dict(zip((*ADAPTIVE["METRIC"], *ADAPTIVE["IMPERIAL"]), core.UNIT_METERS.items(), strict=True))
 LEAST = {"MILLIMETERS": 1e-2}  # In an adaptive unit lengths are at least 1 or this: few count micrometers.
 LEAST_NUMBER = 10.0  # The unit of a whole object suits this many tolerances.
+ZERO = 1e-6  # A number below this, in unit radius, counts as 0.
 SUPERSCRIPTS = {1: "", 2: "²"}
 
 
@@ -46,6 +47,13 @@ def unit_of_report(scene: bpy.types.Scene, report: Mapping[str, Any]) -> Unit:
     return unit_of(scene, LEAST_NUMBER * (report["tolerance"] or report["height_std"]))
 
 
+def unit_of_colors(scene: bpy.types.Scene, report: Mapping[str, Any], power: int) -> Unit:
+    """The unit of what a patch or whole object shows, in length^power; curvatures suit the object's size."""
+    if power < 0 and "tolerance" in report:
+        return unit_of(scene, report["size"])
+    return unit_of_report(scene, report)
+
+
 def say(value: float, power: int, unit: Unit, std: float | None = None) -> str:
     """A value in length^power in words, such as "0.0123 mm" or "-4.2 ± 0.3 1/mm²"."""
     scale = unit[1] ** power
@@ -53,6 +61,11 @@ def say(value: float, power: int, unit: Unit, std: float | None = None) -> str:
         return f"{value / scale:.3g} {symbol(power, unit)}".strip()
     value, spread = known(value / scale, std / scale), float(f"{std / scale:.1g}")
     return f"{value:.3g} ± {spread:g} {symbol(power, unit)}".strip()
+
+
+def rounded(value: float, power: int, radius: float) -> float:
+    """A value in length^power of a patch of this radius; what single precision leaves of 0 is 0."""
+    return value if abs(value) > ZERO * radius**power else 0.0
 
 
 def known(value: float, std: float) -> float:

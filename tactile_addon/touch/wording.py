@@ -12,7 +12,7 @@ import numpy as np
 from ... import core
 from ...core.arguments import many
 from .touch_report import Registration, SuggestedPlane, TouchReport
-from .units import Unit, known, length, say, unit_of
+from .units import Unit, known, length, rounded, say, unit_of
 
 SPREAD = ("mean", "median", "max", "rms")
 FORMULAS = ("=", "+", "-", "@", "\t", "\r", "\n")  # Spreadsheets run text that begins with one of these.
@@ -102,7 +102,9 @@ def _lengths(report: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     names = [name for name in ("step", "extent", "radius") if name in report]
     rows = [(", ".join(names), ", ".join(say(report[name], 1, unit) for name in names))]
     if "misses" in report:
-        rows.append(("curves miss it by", ", ".join(say(miss, 1, unit) for miss in report["misses"])))
+        rows.append(
+            ("curves miss it by", ", ".join(_length(miss, report, unit) for miss in report["misses"]))
+        )
     return rows
 
 
@@ -137,7 +139,7 @@ def _verification(report: TouchReport, unit: Unit) -> str:
         return "no vertex of the mesh lies over the patch"
     mean, farthest = (
         _shared(report, "vertex_distance_mean", unit),
-        say(report["vertex_distance_max"], 1, unit),
+        _length(report["vertex_distance_max"], report, unit),
     )
     return f"mean {mean}; largest {farthest}; {many(report['vertices'], 'vertex', 'vertices')}"
 
@@ -150,12 +152,12 @@ def _verified_rows(report: TouchReport, unit: Unit) -> list[tuple[str, str]]:
     if found is None:
         return rows
     names = [name for name in ("vertex", "contact") if f"{name}_distance_mean" in found]
-    more = f"{say(found['extra_fit_error'], 1, unit)}, " if "extra_fit_error" in found else ""
+    more = f"{_length(found['extra_fit_error'], report, unit)}, " if "extra_fit_error" in found else ""
     points = many(found["extra_points"], "point", "points")
     curves = many(found["extra_contours"], "curve", "curves")
     return [
         *rows,
-        *((f"{name} distances", _spread(found, f"{name}_distance", unit)) for name in names),
+        *((f"{name} distances", _spread(report, f"{name}_distance", unit)) for name in names),
         ("(6) on more curves", f"{more}{points} on {curves}"),
         ("overlap", f"{100.0 * found['overlap']:.0f} % of the area"),
     ]
@@ -170,9 +172,10 @@ def registration_summary(found: Registration, unit: Unit | None = None) -> str:
     return f"{words}; others of its {len(found['residuals'])} poses are about as good"
 
 
-def _spread(found: Mapping[str, Any], what: str, unit: Unit) -> str:
-    """Mean, median, largest and root mean square of distances in words."""
-    return ", ".join(f"{key} {say(found[f'{what}_{key}'], 1, unit)}" for key in SPREAD)
+def _spread(report: TouchReport, what: str, unit: Unit) -> str:
+    """Mean, median, largest and root mean square of distances of the verification in words."""
+    found = report["verification"]
+    return ", ".join(f"{key} {_length(found[f'{what}_{key}'], report, unit)}" for key in SPREAD)
 
 
 def _suggestion(plane: SuggestedPlane, unit: Unit) -> str:
@@ -191,7 +194,7 @@ def vector(v: Iterable[float]) -> str:
 
 def _measured(report: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
     """A value of the report, which is in length^power, in words with its standard deviation."""
-    return say(report[key], power, unit, report[f"{key}_std"])
+    return say(rounded(report[key], power, report["radius"]), power, unit, report[f"{key}_std"])
 
 
 def _amplitude(report: TouchReport, unit: Unit) -> str:
@@ -201,7 +204,13 @@ def _amplitude(report: TouchReport, unit: Unit) -> str:
 
 def _shared(report: Mapping[str, Any], key: str, unit: Unit) -> str:
     """A length of the report in words, with its share of the radius."""
-    return f"{say(report[key], 1, unit)}, {100.0 * report[key] / report['radius']:.2f} % of the radius"
+    share = 100.0 * report[key] / report["radius"]
+    return f"{_length(report[key], report, unit)}, {share:.2f} % of the radius"
+
+
+def _length(value: float, report: Mapping[str, Any], unit: Unit) -> str:
+    """A length of the report in words, as `rounded` has it."""
+    return say(rounded(value, 1, report["radius"]), 1, unit)
 
 
 def cell(words: str) -> str:

@@ -154,8 +154,8 @@ def draw_legend() -> None:
         shown = patch.tactile_colors
         low = 0.0 if shown in patch_record.POSITIVE else -1.0
         title = patch.bl_rna.properties["tactile_colors"].enum_items[shown].name
-        unit = units.unit_of_report(context.scene, record)
-        bar = _scale(title, record, unit, patch_record.POWERS[shown], low)
+        power = patch_record.POWERS[shown]
+        bar = _scale(title, record, units.unit_of_colors(context.scene, record, power), power, low)
         _draw_box(context, *bar, [("Unknown", colors.UNKNOWN)] if record.get("is_gray") else ())
     elif obj is not None and patch_record.MAP_RECORD in obj and obj.visible_get():
         record, shown = obj[patch_record.MAP_RECORD], obj.tactile_map_colors

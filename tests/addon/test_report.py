@@ -222,3 +222,14 @@ def test_only_all_of_a_surface_is_100_percent(extension):
     values, weights = np.array([0.0, 1.0]), np.array([9999.0, 1.0])
     page = Page(parts.bands(values, weights, 0.5, ("mm", 1.0), [("less", 0.9), ("all", 1.5)]))
     assert (band(page, "less"), band(page, "all")) == (99.9, 100.0)
+
+
+def test_what_rounding_leaves_of_a_distance_is_0(extension, empty):
+    empty.ops.mesh.primitive_cube_add(size=0.002)
+    empty.ops.tactile.reconstruct(target="Cube", location=(0.0001, 0.0002, 0.001))
+    patch = empty.context.object
+    empty.ops.tactile.verify(target="Cube")
+    report = patch["tactile"].to_dict()
+    report["verification"] |= {"vertex_distance_max": 3e-20, "extra_fit_error": 2e-20}
+    rows = extension.tactile_addon.touch.wording.readable_rows(report | {"fit_error": 1e-19})
+    assert not re.search(r"e-[1-9]\d", " ".join(value for label, value in rows if label != "milliseconds")), rows
