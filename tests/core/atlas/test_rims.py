@@ -45,6 +45,16 @@ def test_a_touch_of_a_flat_face_goes_on_to_its_edges_and_corners():
     assert r.domain.area < 0.5 * 1.2
 
 
+def test_a_patch_beside_an_edge_does_not_reach_beyond_it():
+    """The point is 3e-3 beside the edge, and the patch is .6 long."""
+    block = solids.block(0.6, 0.5, 0.5)
+    block = solids.Convex(block.distance, (0.597, 0.0, 0.5), (0.0, 0.0, 1.0), block.walls)
+    r, rim = rim_of(block, extent=0.6)
+    points = r.frame.to_world(np.column_stack([rim, np.zeros(AZIMUTHS)]))
+    assert points[:, 0].max() < 0.6 + 1e-3
+    assert points[:, 0].min() < 0.0
+
+
 def test_where_there_is_a_hole_a_patch_ends_before_it():
     block = Pierced(solids.block().distance, (-0.1, 0.0, 0.5), (0.0, 0.0, 1.0), solids.block().walls)
     r, rim = rim_of(block, extent=0.42)
