@@ -22,7 +22,7 @@ TIPS = {
     "κ2": "The larger principal curvature at the point; below 0 the surface bulges outward",
     "Height": "Standard deviation of the height: how well the contacts determine it, on average",
     "At the Rim": "The largest on the rim, where deviations from the mesh are largest; … until you let go",
-    "Misfit": "Mean distance in height between patch and mesh; … until you let go, – if no mesh is below",
+    "Misfit": "Mean distance in height between patch and mesh; – if no mesh is below",
     "1/κ1": "Radius of the circle that bends like the surface along the first principal direction",
     "1/κ2": "Radius of the circle that bends like the surface along the second principal direction",
     "K Gaussian": "Gaussian curvature, κ1 times κ2: above 0 on domes and bowls, below 0 on saddles",
