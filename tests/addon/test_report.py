@@ -232,4 +232,4 @@ def test_what_rounding_leaves_of_a_distance_is_0(extension, empty):
     report = patch["tactile"].to_dict()
     report["verification"] |= {"vertex_distance_max": 3e-20, "extra_fit_error": 2e-20}
     rows = extension.tactile_addon.touch.wording.readable_rows(report | {"fit_error": 1e-19})
-    assert not re.search(r"e-[1-9]\d", " ".join(value for label, value in rows if label != "milliseconds")), rows
+    assert not re.search(r"e-[1-9]\d", " ".join(value for _, value in rows)), rows
