@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arguments import Array
-from ..contours.contour import EXTENT, UNEXPLAINED, Contour, SamplingPlane, stops_at
+from ..contours.contour import EXTENT, SURFACE_STOPS, UNEXPLAINED, Contour, SamplingPlane, stops_at
 from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
@@ -29,7 +29,7 @@ STRIP = 4.0  # unless this multiple of a strip's width is less.
 class Exploration:
     """A touch: what was felt, and the reconstruction of it.
 
-    extent : length of the longest half curve
+    extent : length up to which half curves go, or that of the longest if it is chosen
     step : distance along a curve between contacts
     planes : the given planes and those that were added
     stds : the mean deviation of the height with the planes given, and after each that was added
@@ -41,6 +41,14 @@ class Exploration:
     step: float
     planes: tuple[SamplingPlane, ...]
     stds: tuple[float, ...] = ()
+
+    @property
+    def reach(self) -> float:
+        """The length of the longest half curve; the surface may end all before a given extent."""
+        if any(stop not in SURFACE_STOPS for contour in self.contours for stop in contour.stops or ()):
+            return self.extent
+        tracked = TrackedContours(self.contours, self.result.frame.origin, self.step, None)
+        return self.step * int(tracked.whole.max())
 
 
 Steps = Generator[Request, Answer, Exploration]

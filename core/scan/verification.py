@@ -141,8 +141,8 @@ def _azimuths_between(domain: Domain, count: int) -> list[float]:
 
 def _start(r: Reconstruction, surface: Surface) -> Vector | None:
     """The place of the surface nearest to the reference point along the normal, or None."""
-    hits = (_below(r, surface, (0.0, 0.0, reach * r.radius), 2.0 * reach * r.radius) for reach in FOOT_REACH)
-    return next(filter(None, hits), None)
+    feet = (_foot(r, surface, (0.0, 0.0, reach * r.radius), 2.0 * reach * r.radius) for reach in FOOT_REACH)
+    return next(filter(None, feet), None)
 
 
 def _overlap(r: Reconstruction, surface: Surface) -> float:
@@ -150,18 +150,20 @@ def _overlap(r: Reconstruction, surface: Surface) -> float:
     points, _ = r.domain.grid(GRID)
     d = r.geometry.derivatives(*points.T)
     area = np.sqrt(1.0 + d.x**2 + d.y**2)
-    below = [_below(r, surface, (x, y, r.radius), 2.0 * r.radius) is not None for x, y in points.tolist()]
+    up = vector_of(r.frame.axes[:, 2])
+    feet = (_foot(r, surface, (x, y, r.radius), 2.0 * r.radius) for x, y in points.tolist())
+    below = [foot is not None and not is_hidden(surface, foot, up, 2.0 * r.radius) for foot in feet]
     return float(area[below].sum() / area.sum())
 
 
-def _below(r: Reconstruction, surface: Surface, local: Vector, distance: float) -> Vector | None:
-    """The world point where a ray from a local point down along the normal meets what a finger can reach."""
+def _foot(r: Reconstruction, surface: Surface, local: Vector, distance: float) -> Vector | None:
+    """The world point where a ray from a local point down along the normal meets the outside, or None."""
     up = vector_of(r.frame.axes[:, 2])
     hit = surface.ray_cast(vector_of(r.frame.to_world(local)), scaled(up, -1.0), distance)
     if hit is None:
         return None
     point, normal = contact_of(hit, 1.0)
-    return None if dot(normal, up) <= 0.0 or is_hidden(surface, point, up, 2.0 * r.radius) else point
+    return point if dot(normal, up) > 0.0 else None
 
 
 def is_hidden(surface: Surface, point: Vector, up: Vector, reach: float) -> bool:

@@ -56,12 +56,12 @@ def recolor(obj: Object) -> None:
     shown, mesh = obj.tactile_colors, obj.data
     shades, record = values(mesh, shown), obj[RECORD if RECORD in obj else ATLAS_RECORD]
     unknown = _unknown(mesh) if shown in CURVATURES else []
-    floor = _least_range(record, shown)
+    flat = floor = _least_range(record, shown)
     if shown == "gaussian_curvature":
         floor = least_gaussian_range(np.delete(values(mesh, "curvedness"), unknown), floor)
     record["own_limit"] = colors.symmetric_range(np.delete(shades, unknown), floor)
     record["error_limit"] = _error_range(mesh, shown, unknown, floor)
-    limit = obj.get(RANGE) or _automatic_range(record, obj.get(COMMON_RANGE, 0.0))
+    limit = obj.get(RANGE) or _automatic_range(record, obj.get(COMMON_RANGE, 0.0), flat)
     rgba = colors.diverging(np.append(shades, 0.0), limit, [len(shades)])
     at = np.arange(len(shades)) if RECORD in obj else _corners_shown(mesh, unknown, record["edge"])
     mesh.attributes[COLOR].data.foreach_set("color", rgba[at].ravel())
@@ -72,17 +72,19 @@ def recolor(obj: Object) -> None:
     record["color_limit"] = limit
 
 
-def _automatic_range(record: Mapping[str, Any], common: float) -> float:
+def _automatic_range(record: Mapping[str, Any], common: float, flat: float) -> float:
     """The range of a patch or whole object from its record, and from the common range of patches, or 0.
 
-    A tiny patch whose K is as good as 0 stays pale.
+    A tiny patch whose K is as good as 0 stays pale, and beside patches with the range of flat ones all do.
     """
     if not common:
         return float(max(record["own_limit"], record["error_limit"]))
-    if record["status"] == "uncertain":
+    is_sure = record["status"] != "uncertain"
+    if not is_sure and common > flat:
         return float(common)
     # While the probe is dragged, the common range is that of where it was.
-    return float(max(common, record["error_limit" if record["is_verified"] else "own_limit"]))
+    is_own = is_sure and not record["is_verified"]
+    return float(max(common, record["own_limit" if is_own else "error_limit"]))
 
 
 def least_gaussian_range(curvedness: Array, floor: float) -> float:

@@ -10,6 +10,7 @@ import bpy
 from ..touch import units
 from ..touch.touch_report import TouchReport
 from ..touch.units import Unit
+from ..touch.wording import is_flat
 
 FLAT_DEVIATIONS = 2.0  # A curvature within this many deviations of 0 has no radius.
 FLATTEST = 1e-3  # Nor has one whose radius is a thousand times the patch's.
@@ -73,8 +74,7 @@ def _said(record: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
 
 def _shape_index(record: Mapping[str, Any]) -> str:
     """The shape index in words; a flat patch has none."""
-    flat = not any(units.known(_value(record, key, -1), record[f"{key}_std"]) for key in ("k1", "k2"))
-    return "–" if flat else f"{record['shape_index']:.2f}"
+    return "–" if is_flat(record) else f"{record['shape_index']:.2f}"
 
 
 def _measured(record: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:

@@ -191,7 +191,7 @@ class StabilityMap:
         self.measures[number] = (
             NOTHING if result.taps.height is None else result.taps.height,
             result.mean_height_std,
-            touch.extent,
+            touch.reach,
             result.condition_number,
             result.null_space_share,
         )

@@ -37,15 +37,15 @@ def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
         ("principal curvatures", ", ".join(_measured(report, key, -1, unit) for key in ("k1", "k2"))),
         ("Gaussian curvature", _measured(report, "gaussian_curvature", -2, unit)),
         ("mean curvature", _measured(report, "mean_curvature", -1, unit)),
-        ("shape index", f"{report['shape_index']:.3f}"),
-        ("curvedness", say(report["curvedness"], -1, unit)),
+        ("shape index", "none, it is flat" if is_flat(report) else f"{report['shape_index']:.3f}"),
+        ("curvedness", say(rounded(report["curvedness"], -1, report["radius"]), -1, unit)),
         ("Gaussian process", _amplitude(report, unit)),
         ("fit error (6)", _shared(report, "fit_error", unit)),
         ("standard deviation of the height", _shared(report, "height_std", unit)),
         ("mesh to patch", _verification(report, unit)),
         *_verified_rows(report, unit),
         ("suggested next plane", _suggestion(report["suggested_plane"], unit)),
-        ("total |K| (8)", f"{report['total_absolute_curvature']:.4g}"),
+        ("total |K| (8)", f"{rounded(report['total_absolute_curvature'], 0, report['radius']):.4g}"),
         ("condition number", f"{report['condition_number']:.2g}"),
         ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in seconds.items())),
     ]
@@ -68,6 +68,12 @@ def verdict(report: TouchReport, unit: Unit) -> str:
         number = "all" if count == stops.total() else f"{count} of {stops.total()}"
         return f"Good, with {number} half curves cut short {' or '.join(where for _, where in early)}"
     return f"Good: heights to ± {say(report['height_std'], 1, unit)}"
+
+
+def is_flat(report: Mapping[str, Any]) -> bool:
+    """Whether both principal curvatures are 0 to the digits that are known of them."""
+    radius = report["radius"]
+    return not any(known(rounded(report[key], -1, radius), report[f"{key}_std"]) for key in ("k1", "k2"))
 
 
 def added_planes(report: TouchReport, unit: Unit) -> str:

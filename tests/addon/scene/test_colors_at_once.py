@@ -93,6 +93,15 @@ def test_patches_whose_curvature_is_as_good_as_0_have_one_range(empty):
     assert min(limits) > 2.0 * max(patch["tactile"]["own_limit"] for patch in patches)
 
 
+def test_a_patch_in_doubt_whose_curvature_is_as_good_as_0_stays_pale_beside_a_flat_one(empty):
+    empty.ops.mesh.primitive_cylinder_add()
+    empty.context.object.name = "Sphere"
+    side, lid = (touch(empty, place, extent=0.0) for place in ((0.98, 0.19, 0.99), (0.2, 0.1, 1.0)))
+    assert [patch["tactile"]["status"] for patch in (side, lid)] == ["uncertain", "ok"]
+    assert side["tactile"]["color_limit"] == side["tactile"]["error_limit"] > 0.0
+    assert lid["tactile"]["color_limit"] < 0.01 * side["tactile"]["color_limit"]
+
+
 def test_a_patch_in_doubt_has_the_range_of_those_that_are_sure(empty, ball):
     sure, noisy, worse = (
         touch(empty, (0, 0, 1)),

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Automatic extent and step: how far curves grow, what ends them, how many contacts they get."""
 
+import math
+
 import numpy as np
 import pytest
 import solids
@@ -68,6 +70,21 @@ def test_on_a_sphere_the_patch_is_large_and_as_good_as_it_says(radius, noise):
     world = r.frame.to_world(np.column_stack([points, r.patch.height(*points.T)]))
     off = weights @ np.abs(np.linalg.norm(world - center, axis=1) - radius)
     assert off < 3.0 * r.mean_height_std
+
+
+@pytest.mark.parametrize("extent", [8.0, 3.0, None])
+def test_reach_is_shorter_than_a_given_extent_where_the_surface_ends_all_curves(extent):
+    class Disk:
+        """The plane z = 0 up to a distance of 5 from the origin."""
+
+        def ray_cast(self, origin, direction, distance):
+            hit = surfaces.plane().ray_cast(origin, direction, distance)
+            return hit if hit is not None and math.hypot(*hit[0][:2]) <= 5.0 else None
+
+    found = explore(Disk(), extent="auto" if extent is None else extent)
+    assert found.extent == (extent or pytest.approx(5.0, abs=found.step))
+    assert found.reach == pytest.approx(min(found.extent, 5.0), abs=found.step)
+    assert found.reach <= 5.0
 
 
 @pytest.mark.parametrize(("high", "wide"), [(1.6, 2.4), (1.4, 2.3), (3.2, 2.8)])

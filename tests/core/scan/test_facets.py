@@ -129,12 +129,12 @@ def test_a_bend_is_no_flat_face():
 
 
 class Mesh:
-    """Triangles of a convex mesh around the origin, which a ray meets."""
+    """Faces of a convex mesh around the origin, which a ray meets."""
 
     def __init__(self, corners):
-        self.corners = np.array(corners)  # (n, 3, 3), counterclockwise from outside
-        a, b, c = self.corners.swapaxes(0, 1)
-        self.normals = np.cross(b - a, c - a)
+        self.corners = np.array(corners)  # (n, 3 or 4, 3), counterclockwise from outside
+        a, b, c = self.corners.swapaxes(0, 1)[[0, 1, -1]]
+        self.normals = np.cross(self.corners[:, 2] - a, c - b)  # The diagonals, or sides of a triangle.
         self.normals /= np.linalg.norm(self.normals, axis=1, keepdims=True)
         self.offs = (self.normals * a).sum(axis=1)
 
@@ -205,11 +205,12 @@ def uv_ball(segments, rings):
     """Blender's ball of `segments` around its axis and `rings` from pole to pole."""
     turns, tilts = 2.0 * math.pi / segments * np.arange(segments + 1), math.pi / rings * np.arange(rings + 1)
     at = [[(math.sin(b) * math.cos(a), math.sin(b) * math.sin(a), math.cos(b)) for a in turns] for b in tilts]
-    faces = []
-    for upper, lower in itertools.pairwise(at):
-        for (a, b), (c, d) in zip(itertools.pairwise(upper), itertools.pairwise(lower), strict=True):
-            faces += [(a, c, d), (a, d, b)]
-    return Mesh([face for face in faces if np.linalg.norm(np.cross(*np.subtract(face[1:], face[0]))) > 1e-9])
+    rows = [np.array(list(itertools.pairwise(row))) for row in at]
+    faces = [
+        np.stack([upper[:, 0], lower[:, 0], lower[:, 1], upper[:, 1]], axis=1)
+        for upper, lower in itertools.pairwise(rows)
+    ]
+    return Mesh(np.concatenate(faces))
 
 
 @pytest.mark.parametrize(("segments", "rings"), [(16, 64), (64, 12)])

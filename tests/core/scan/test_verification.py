@@ -210,6 +210,16 @@ def test_another_layer_than_the_nearest_does_not_count():
     assert len(seen(lifted, roofed, vertices[~on_roof], normals[~on_roof])) > 50
 
 
+def test_further_contours_begin_below_an_overhang():
+    """A roof over the point hides it, but the patch is below it."""
+    surface = SURFACES["sphere"]
+    r = touched(surface)
+    direction = np.array([0.0, 0.0, 1.0]) - r.frame.axes[2, 2] * r.frame.axes[:, 2]
+    roofed = Cut(surface, r.frame.origin + 0.1 * r.radius * direction, direction, roof=0.5 * r.radius)
+    found = verify(r, roofed, np.empty((0, 3)))
+    assert found["extra_fit_error"] < 0.01 * r.radius
+
+
 def test_no_mesh_below():
     surface = SURFACES["plane"]
     r = shifted(touched(surface), 3.0 * EXTENT)
