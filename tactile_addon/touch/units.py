@@ -48,10 +48,8 @@ def unit_of_report(scene: bpy.types.Scene, report: Mapping[str, Any]) -> Unit:
 
 
 def unit_of_colors(scene: bpy.types.Scene, report: Mapping[str, Any], power: int) -> Unit:
-    """The unit of what a patch or whole object shows, in length^power; curvatures suit the object's size."""
-    if power < 0 and "tolerance" in report:
-        return unit_of(scene, report["size"])
-    return unit_of_report(scene, report)
+    """The unit of what a patch or whole object shows, in length^power; curvatures suit patches."""
+    return unit_of(scene, report["radius"]) if power < 0 else unit_of_report(scene, report)
 
 
 def say(value: float, power: int, unit: Unit, std: float | None = None) -> str:
