@@ -75,6 +75,9 @@ def joined(bpy, paths, **options):
 def test_contacts_of_three_files_become_one_closed_surface(empty, three_files):
     surface, record = joined(empty, three_files, tolerance=0.02)
     assert surface.name == "part0.csv and 2 more Surface"
+    unit = empty.context.scene.unit_settings
+    assert (unit.system, unit.length_unit) == ("METRIC", "METERS")
+    assert surface.tactile_range == pytest.approx(record["color_limit"])  # It is in 1/m^2, as of a patch.
     assert (record["source"], record["contacts"]) == ("part0.csv and 2 more", 3000)
     assert empty.context.view_layer.objects.active == surface
     assert record["is_closed"]
