@@ -72,7 +72,7 @@ GUI_ARGS="$out/scene.blend" step "the pictures of the worked example" \
   $gui shot tests/gui/worked_example.py "$out/worked_example.png"
 GUI_ARGS="$out/scene.blend" step "the verification's checks" \
   $gui shot tests/gui/verify.py "$out/verify.png"
-GUI_TIMEOUT=300 GUI_ARGS="$out/scene.blend" step "the stability map's checks" \
+GUI_TIMEOUT=600 GUI_ARGS="$out/scene.blend" step "the stability map's checks" \
   $gui shot tests/gui/stability.py "$out/stability.png"
 GUI_TIMEOUT=600 GUI_ARGS="$out/scene.blend" step "the checks of whole objects" \
   $gui shot tests/gui/whole_object.py "$out/whole_object.png"
