@@ -130,7 +130,7 @@ def by_escape():
     before = data_blocks()
     activate("Suzanne")
     yield from start(target="Suzanne", spacing=0.02)
-    yield 1.5
+    yield 3
     check("it is under way", running())
     gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "Escape")
     yield from until(lambda: not running(), 10)
