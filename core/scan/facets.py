@@ -55,6 +55,7 @@ def has_few_facets(
     shape = cache(lambda face: _facet(corners_of(face)))
 
     def facet_near(at: Array) -> Facet:
+        """The face nearest to a point (3,)."""
         return shape(face_near(at))
 
     width, radius = _width(facet_near(r.frame.origin), facet_near), r.radius
