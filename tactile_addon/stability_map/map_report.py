@@ -13,8 +13,6 @@ from ..touch.units import Unit
 from . import map_object
 from .stability import REASONS
 
-ZERO = 1e-6  # A median below this share of the spacing counts as 0.
-
 
 FACETED = 0.5  # The share of the patches from which on a map says that they follow facets.
 
@@ -93,5 +91,5 @@ def _medians(record: Mapping[str, Any], unit: Unit) -> Iterator[tuple[str, str, 
             yield (
                 name,
                 title,
-                units.say(found if found > ZERO * record["spacing"] ** power else 0.0, power, unit),
+                units.say(units.rounded(found, power, record["spacing"]), power, unit),
             )

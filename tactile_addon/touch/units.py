@@ -19,7 +19,7 @@ ADAPTIVE = {
 METERS = dict(zip((*ADAPTIVE["METRIC"], *ADAPTIVE["IMPERIAL"]), core.UNIT_METERS.items(), strict=True))
 LEAST = {"MILLIMETERS": 1e-2}  # In an adaptive unit lengths are at least 1 or this: few count micrometers.
 LEAST_NUMBER = 10.0  # The unit of a whole object suits this many tolerances.
-ZERO = 1e-6  # A number below this, in unit radius, counts as 0.
+ZERO = 1e-6  # A number below this, in units of the radius or the size, counts as 0.
 SUPERSCRIPTS = {1: "", 2: "²"}
 
 
@@ -61,9 +61,9 @@ def say(value: float, power: int, unit: Unit, std: float | None = None) -> str:
     return f"{value:.3g} ± {spread:g} {symbol(power, unit)}".strip()
 
 
-def rounded(value: float, power: int, radius: float) -> float:
-    """A value in length^power of a patch of this radius; what single precision leaves of 0 is 0."""
-    return value if abs(value) > ZERO * radius**power else 0.0
+def rounded(value: float, power: int, size: float) -> float:
+    """A value in length^power of a thing of this size; what single precision leaves of 0 is 0."""
+    return value if abs(value) > ZERO * size**power else 0.0
 
 
 def known(value: float, std: float) -> float:

@@ -17,7 +17,6 @@ from ..touch.wording import vector
 # A surface is good if this share of it is within the tolerance of the mesh, and all within so many.
 WITHIN_SHARE, OFF_TOLERANCES = 0.99, 3.0
 FACETED = 0.5  # The panel says that curvatures are those of facets from this share of the area on.
-ZERO = 1e-6  # A distance below this share of the size counts as 0.
 
 
 def unit_of(record: Mapping[str, Any]) -> Unit:
@@ -164,8 +163,7 @@ def deviation(record: Mapping[str, Any], what: str) -> str | None:
     off = record.get(f"deviation_{what}")
     if off is None:
         return None
-    # In single precision a little is left of 0.
-    return units.say(off if off > ZERO * record["size"] else 0.0, 1, unit_of(record))
+    return units.say(units.rounded(off, 1, record["size"]), 1, unit_of(record))
 
 
 def _place(record: Mapping[str, Any]) -> str | None:
