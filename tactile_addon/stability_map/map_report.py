@@ -13,7 +13,6 @@ from ..touch.units import Unit
 from . import map_object
 from .stability import REASONS
 
-
 FACETED = 0.5  # The share of the patches from which on a map says that they follow facets.
 
 
