@@ -15,7 +15,11 @@ from ..reconstruction.result import Reconstruction
 
 # benchmarks.facets shows how far curvatures are off with these.
 OTHER = 0.2  # Curvatures are those of a facet if they are off by this share of the larger one of the shape,
-SPAN = 2.0  # which follows from how facets turn within this many widths, and the radius of curvature.
+SPAN, BEND = (
+    2.0,
+    math.radians(40.0),
+)  # which follows from how facets turn within so many widths and this angle,
+TURNS = np.radians([0.0, 20.0, 40.0])  # below the curves, and below these turned around the normal.
 # Edges between these angles stand for a smooth bend,
 DISTINCT_COSINE, SMOOTH_COSINE = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))
 # if both facets have this share of the wider one's width across it, and of the radius; else one is a fillet.
@@ -26,17 +30,15 @@ NEIGHBOR_STEP = 0.05  # The facet behind an edge is looked for this share of the
 
 
 class Facet(NamedTuple):
-    """A face: its corners (k, 3), its unit normal, and its area."""
+    """A face: its corners (k, 3), and its unit normal."""
 
     corners: Array
     normal: Array
-    area: float
 
     def width(self, edge: Array) -> float:
-        """The mean width of the face across the direction of an edge (3,), a length."""
-        return (
-            self.area * float(np.linalg.norm(edge)) / float(np.ptp(self.corners @ edge)) if self.area else 0.0
-        )
+        """The width of the face across the direction of an edge (3,), a length; 0 for an edge without one."""
+        across, length = np.cross(edge, self.normal), float(np.linalg.norm(edge))
+        return float(np.ptp(self.corners @ across)) / length if length else 0.0
 
 
 def has_few_facets(
@@ -65,8 +67,10 @@ def has_few_facets(
             return False
         radius *= 0.5
     # Where facets narrow, as near the tip of a cone, their widths would reach around it and beyond the tip.
-    reach = 1.0 / max(abs(r.k1), abs(r.k2), 1.0 / (SPAN * width))
-    points = r.frame.origin + reach / r.radius * (points - r.frame.origin)
+    reach = 1.0 / max(abs(r.k1) / BEND, abs(r.k2) / BEND, 1.0 / (SPAN * width))
+    x, y, z = reach / r.radius * r.frame.to_local(points).T
+    c, s = np.cos(TURNS)[:, None], np.sin(TURNS)[:, None]
+    points = r.frame.to_world(np.stack([c * x - s * y, s * x + c * y, z + 0.0 * c], axis=2).reshape(-1, 3))
     faces = [face_near(point) for point in points]
     around, wide = map(shape, set(faces)), max(width, radius)
     if not any(_is_smooth(facet, wide, facet_near) for facet in around):
@@ -141,11 +145,8 @@ def _is_smooth(facet: Facet, radius: float, facet_near: Callable[[Array], Facet]
 
 
 def _facet(corners: ArrayLike) -> Facet:
-    """The face with these corners; its normal and area are 0 if it has none."""
+    """The face with these corners; its normal is 0 if it has no area."""
     points = np.asarray(corners, dtype=float)
     sides = points - points[0]
     across = np.cross(sides[1:-1], sides[2:]).sum(axis=0)
-    twice = float(np.linalg.norm(across))
-    if not twice:
-        return Facet(points, across, 0.0)
-    return Facet(points, across / twice, 0.5 * twice)
+    return Facet(points, across / (float(np.linalg.norm(across)) or 1.0))
