@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import Array
+from ..contours.local_geometry import Frame
 from ..reconstruction.result import Reconstruction
 
 # benchmarks.facets shows how far curvatures are off with these.
@@ -68,9 +69,7 @@ def has_few_facets(
         radius *= 0.5
     # Where facets narrow, as near the tip of a cone, their widths would reach around it and beyond the tip.
     reach = 1.0 / max(abs(r.k1) / BEND, abs(r.k2) / BEND, 1.0 / (SPAN * width))
-    x, y, z = reach / r.radius * r.frame.to_local(points).T
-    c, s = np.cos(TURNS)[:, None], np.sin(TURNS)[:, None]
-    points = r.frame.to_world(np.stack([c * x - s * y, s * x + c * y, z + 0.0 * c], axis=2).reshape(-1, 3))
+    points = _turned(r.frame, r.frame.origin + reach / r.radius * (points - r.frame.origin))
     faces = [face_near(point) for point in points]
     around, wide = map(shape, set(faces)), max(width, radius)
     if not any(_is_smooth(facet, wide, facet_near) for facet in around):
@@ -89,6 +88,13 @@ def is_beside_bend(
     """
     facet = _facet(corners_of(face_near(point)))
     return _is_smooth(facet, 0.0, lambda at: _facet(corners_of(face_near(at))))
+
+
+def _turned(frame: Frame, points: Array) -> Array:
+    """Points (n, 3) of the world, turned by TURNS around the normal of a frame, (len(TURNS) n, 3)."""
+    x, y, z = frame.to_local(points).T
+    turned = [(x * c - y * s, x * s + y * c, z) for c, s in zip(np.cos(TURNS), np.sin(TURNS), strict=True)]
+    return frame.to_world(np.concatenate(turned, axis=1).T)
 
 
 def _are_few(facets: Iterable[Facet]) -> bool:
