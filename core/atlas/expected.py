@@ -5,10 +5,11 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arguments import LARGEST, Array, finite_array, number
+from ..arguments import LARGEST, Array, finite_array, number, unit_vector
 from ..contours.contour import vector_of
 from ..contours.finger import Surface
 from ..contours.tracking import generator_of
+from ..exploration.one_touch import Exploration
 from ..exploration.options import ExplorationOptions
 from ..exploration.side_by_side import exploring_many
 from ..reconstruction.result import Reconstruction
@@ -17,8 +18,14 @@ from .finger import finger_at
 from .rims import radial_extent
 from .touching import FIRST_EXTENT, NEAR, SIZE
 
-# Patches overlap, so that all have this many times the area of the object: python -m benchmarks.add_menu.
-OVERLAP = 2.0
+# python -m benchmarks.add_menu --expected judges these.
+ROUNDS, AT_ONCE = (
+    3,
+    4,
+)  # So many touches are made at once, so many times, where those before have felt nothing.
+LATER = 8  # The last ones are as large as those to come,
+OVERLAP = 3.0  # and overlap, so that they have this many times the area that is left.
+FACING = 0.5  # A patch covers walls that face as it does, by this cosine or more.
 
 
 def expected_touches(
@@ -30,30 +37,49 @@ def expected_touches(
     tolerance: float,
     noise: float = 0.0,
     rng: np.random.Generator | int | None = None,
-) -> float:
-    """About how many touches `explore_object` makes of an object; too many where walls are flat.
+) -> tuple[float, int]:
+    """About how many touches `explore_object` makes of an object, and how many were made to find that out.
 
-    points, outward : (n, 3), places spread evenly over the object, and the outward directions there
+    points, outward : (n, 3), hundreds of places spread evenly over the object, in random order, and the
+        outward directions there
     area : of the object, in the square of the caller's unit
     tolerance, noise, rng : as in `explore_object`
 
-    Raises ValueError for bad arguments, and if a patch is felt at none of the places.
+    Raises ValueError for bad arguments, and if a patch is felt at none of the places that are touched.
     """
     p, up = (finite_array(*given, (None, 3), LARGEST) for given in (("points", points), ("outward", outward)))
+    up = np.array([unit_vector("outward", direction) for direction in up])
     number("area", area, above=0.0)
     options = ExplorationOptions(
         farthest=FIRST_EXTENT * tolerance, largest_std=SIZE * tolerance, noise=noise, rng=generator_of(rng)
     )
-    felt = []
-    for point, n, e in zip(p, up, result_of(exploring_many(surface, p, up, options)), strict=True):
-        if isinstance(e, ValueError):
-            continue
-        finger = finger_at(surface, vector_of(point), vector_of(n), e.step)
-        radii = e.result.radius * radial_extent(e.result, finger, NEAR * tolerance)
-        felt.append(float(np.pi * np.mean(radii**2)))
-    if not any(felt):
+    left, tried = np.arange(len(p)), 0
+    areas: list[float] = []  # Of the patches at places that none before covers.
+    for _ in range(ROUNDS):
+        places, left = left[:AT_ONCE], left[AT_ONCE:]
+        tried += len(places)
+        covered = np.zeros(len(p), dtype=bool)
+        found = result_of(exploring_many(surface, p[places], up[places], options))
+        for place, e in zip(places, found, strict=True):
+            if isinstance(e, ValueError) or covered[place]:
+                continue
+            rim = _rim(surface, e, up[place], tolerance)
+            if rim.any():
+                areas.append(float(np.pi * np.mean(rim**2)))
+                faces_it = up @ e.result.frame.axes[:, 2] > FACING
+                covered[faces_it] |= covered_by(e.result, rim, p[faces_it], tolerance)
+        left = left[~covered[left]]
+    if not areas:
         raise ValueError("points: expected some where a patch can be felt, got none")
-    return max(1.0, OVERLAP * area * float(np.mean([1.0 / each for each in felt if each])))
+    more = OVERLAP * area * len(left) / len(p) * float(np.mean(1.0 / np.array(areas[-LATER:])))
+    return len(areas) + more, tried
+
+
+def _rim(surface: Surface, e: Exploration, outward: Array, tolerance: float) -> Array:
+    """How far a patch reaches from its point all round, (AZIMUTHS,), lengths."""
+    r = e.result
+    finger = finger_at(surface, vector_of(r.frame.origin), vector_of(outward), e.step)
+    return r.radius * radial_extent(r, finger, NEAR * tolerance)
 
 
 def covered_by(r: Reconstruction, rim: Array, points: Array, tolerance: float) -> NDArray[np.bool_]:

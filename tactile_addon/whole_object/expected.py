@@ -16,7 +16,7 @@ from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Object
 from .object_touches import tolerance_of
 
-TRIED, SEED = 12, 0  # The number of touches that are made for the estimate.
+PLACES, SEED = 600, 0  # A few of so many random places are touched for the estimate.
 # The time of a touch with its part of joining, and that of a mesh, as multiples of the time of a touch that
 # is tried: python -m benchmarks.add_menu.
 JOINING, MESHING = 3.3, 60.0
@@ -54,9 +54,9 @@ def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, f
     """About how many touches a DetachedMesh takes, and seconds. Raises ValueError if none is possible."""
     begin = perf_counter()
     area = 0.5 * float(np.linalg.norm(triangle_cross(mesh.points[mesh.triangles]), axis=1).sum())
-    points, normals = core.scattered(mesh.points, mesh.triangles, TRIED, np.random.default_rng(SEED))
-    touches = core.expected_touches(mesh, points, normals, area, tolerance=tolerance, noise=noise, rng=SEED)
-    each = (perf_counter() - begin) / TRIED
+    places = core.scattered(mesh.points, mesh.triangles, PLACES, np.random.default_rng(SEED))
+    touches, tried = core.expected_touches(mesh, *places, area, tolerance=tolerance, noise=noise, rng=SEED)
+    each = (perf_counter() - begin) / tried
     return _rounded(touches), (MESHING + JOINING * touches) * each
 
 

@@ -8,12 +8,21 @@ import pytest
 import core
 from tests import solids
 
-AROUND = np.array([(0, 0, 1), (0, 0, -1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], dtype=float)
+AROUND = np.random.default_rng(0).normal(size=(200, 3))
+AROUND /= np.linalg.norm(AROUND, axis=1, keepdims=True)
 
 
 def expected(**options):
     options = {"tolerance": 4e-3, "rng": 0} | options
     return core.expected_touches(solids.ball(), AROUND, AROUND, 4.0 * np.pi, **options)
+
+
+def on_block(size, count):
+    """Points (count, 3) all over a block that reaches so far (3,) from its middle, and the normals there."""
+    rng, size = np.random.default_rng(0), np.array(size)
+    axes = rng.choice(3, count, p=(1.0 / size) / (1.0 / size).sum())
+    normals = np.eye(3)[axes] * rng.choice([-1.0, 1.0], count)[:, None]
+    return size * np.where(normals != 0.0, normals, rng.uniform(-0.95, 0.95, (count, 3))), normals
 
 
 @pytest.mark.long
@@ -28,24 +37,41 @@ def test_it_is_about_as_many_as_there_are():
         rng=0,
         progress=lambda done, _: (made.append(done), True)[1],
     )
-    assert 0.5 < expected() / made[-1] < 2.0
+    assert 0.5 < expected()[0] / made[-1] < 2.0
 
 
 def test_finer_tolerances_take_more_touches():
-    assert expected(tolerance=1e-3) > 1.5 * expected()
+    assert expected(tolerance=1e-3)[0] > 1.5 * expected()[0]
 
 
 def test_a_flat_wall_counts_as_far_as_it_is_felt():
     block = solids.block(0.6, 0.5, 0.5)
-    top = core.expected_touches(block, [block.start], [block.outward], 1.2, tolerance=4e-3, rng=0)
-    assert 1.0 <= top < 3.0  # The touch feels all of the face.
+    points, normals = on_block((0.6, 0.5, 0.5), 200)
+    touches, tried = core.expected_touches(block, points, normals, 6.8, tolerance=4e-3, rng=0)
+    assert 6.0 <= touches < 10.0  # Most touches feel all of a face.
+    assert tried <= 12
 
 
-def test_where_no_patch_can_be_felt_it_is_refused():
+def test_the_narrow_walls_of_a_plate_are_not_covered_by_its_wide_ones():
+    """They are thinner than the length within which a place is felt."""
+    plate = solids.block(0.5, 0.5, 0.005)
+    points, normals = on_block((0.5, 0.5, 0.005), 1000)
+    wide = np.abs(normals[:, 2]) > 0.5
+    narrow = int((~wide).sum())
+    touches, tried = core.expected_touches(plate, points, normals, 2.04, tolerance=4e-3, rng=0)
+    faces, _ = core.expected_touches(plate, points[wide], normals[wide], 2.0, tolerance=4e-3, rng=0)
+    assert narrow > 8
+    assert touches > faces + 4.0
+    assert tried == 12
+
+
+def test_it_is_refused_where_no_patch_can_be_felt():
     with pytest.raises(ValueError, match="points: expected some where a patch can be felt, got none"):
         core.expected_touches(solids.ball(), [(0, 0, 3.0)], [(0, 0, 1.0)], 1.0, tolerance=4e-3)
     with pytest.raises(ValueError, match="area: expected a finite number above 0, got 0"):
         core.expected_touches(solids.ball(), AROUND, AROUND, 0.0, tolerance=4e-3)
+    with pytest.raises(ValueError, match="outward: expected"):
+        core.expected_touches(solids.ball(), AROUND, 0.0 * AROUND, 1.0, tolerance=4e-3)
 
 
 def test_a_patch_covers_what_is_inside_its_rim_and_near_to_it():
