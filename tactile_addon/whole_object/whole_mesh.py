@@ -25,8 +25,9 @@ SHARP = math.radians(30.0)  # Edges at which faces are turned by more are crease
 # While a patch is one of many, it is drawn with these rings, the last of which is its dark rim, and spokes.
 RINGS, SPOKES = (0.3, 0.65, 0.95, 1.0), 48
 RIM_COLOR = (0.02, 0.02, 0.02, 1.0)
-GROWN_ABOVE = 3e-3  # It is drawn this share of the object's size above the mesh, in which it would lie,
-LAYER, LAYERS = 6e-4, 10  # and above patches that it overlaps by this share, up to so many times.
+# It is drawn no lower than the mesh, above that by this share of the object's size, or of its own if that is
+# less, and above patches that it overlaps by as much, up to so many times.
+LAYER, OWN_LAYER, LAYERS = 6e-4, 2e-2, 6
 DRAWN_ABOVE = 5e-3  # That of the whole surface, where it is not drawn in front.
 
 
@@ -44,7 +45,7 @@ class GrowingPatches:
             undo.note_added(obj)
         obj.data.materials.append(emission("Tactile Surface", attribute=COLOR))
         self._patches: list[tuple[Array, Array, Array]] = []
-        self._uid, self._size = obj.session_uid, surface.size
+        self._uid, self._size, self._surface = obj.session_uid, surface.size, surface
         self._placed = np.zeros((0, 8))  # The origin, normal, reach and layer of each patch.
         show_colors()
         show_size(surface.size)
@@ -55,8 +56,10 @@ class GrowingPatches:
         if obj is None or not found:
             return
         for r, rim in zip(found, rims, strict=True):
-            above = GROWN_ABOVE + LAYER * self._layer(r.frame, rim.max())
-            self._patches.append(_disk(r, rim, above * self._size))
+            points, normals, k, curvedness = _disk(r, rim)
+            layer = min(LAYER * self._size, OWN_LAYER * float(np.median(rim)))
+            above = _below(self._surface, points, normals) + layer * (1 + self._layer(r.frame, rim.max()))
+            self._patches.append((points + above[:, None] * normals, k, curvedness))
         points, k, curvedness = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
         count = 1 + SPOKES * len(RINGS)
         triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
@@ -84,18 +87,29 @@ class GrowingPatches:
         return next((obj for obj in bpy.data.objects if obj.session_uid == self._uid), None)
 
 
-def _disk(r: core.Reconstruction, rim: Array, above: float) -> tuple[Array, Array, Array]:
-    """Points (n, 3) of a patch, on rings around its middle, their Gaussian curvatures and curvedness (n,).
+def _disk(r: core.Reconstruction, rim: Array) -> tuple[Array, Array, Array, Array]:
+    """Points (n, 3) of a patch, on rings around its middle, normals, Gaussian curvatures and curvedness (n,).
 
     rim : (k SPOKES,), the radii of the patch all round, where the finger felt it end
-    above : the height of the points above the patch
     """
     angles = np.linspace(0.0, 2.0 * np.pi, SPOKES, endpoint=False)
     edge = rim[:: len(rim) // SPOKES, None] * np.column_stack([np.cos(angles), np.sin(angles)])
     x, y = np.vstack([np.zeros((1, 2)), *(share * edge for share in RINGS)]).T
-    d = r.geometry.derivatives(x, y)
-    points = np.column_stack([x, y, d.z]) + above * d.normal
-    return r.frame.to_world(points), r.patch.gaussian_curvature(x, y), r.patch.curvedness(x, y)
+    d, patch = r.geometry.derivatives(x, y), r.patch
+    points = r.frame.to_world(np.column_stack([x, y, d.z]))
+    return points, d.normal @ r.frame.axes.T, patch.gaussian_curvature(x, y), patch.curvedness(x, y)
+
+
+def _below(surface: DetachedMesh, points: Array, normals: Array) -> Array:
+    """How far a mesh is above the points of a disk, (n,), and the middles between these along spokes."""
+    inner = np.maximum(np.arange(1, len(points)) - SPOKES, 0)
+    places = np.vstack([points, 0.5 * (points[1:] + points[inner])])
+    feet = np.array([surface.project(tuple(place))[0] for place in places.tolist()])
+    heights = np.sum((feet - places) * np.vstack([normals, normals[1:]]), axis=1)
+    below, between = np.split(np.maximum(heights, 0.0), [len(points)])
+    below[1:] = np.maximum(below[1:], between)
+    np.maximum.at(below, inner, between)
+    return below
 
 
 def _fan() -> Array:

@@ -84,11 +84,30 @@ def test_growing_patches_are_above_the_mesh_and_each_other(empty, extension, tou
     faces = [np.argmax(r.frame.axes[:, 2] @ np.vstack([np.eye(3), -np.eye(3)]).T) for r in touches.found]
     above = np.abs(points[:, 0]).max(axis=1) - 1.0
     growing.remove()
-    assert 5e-3 < above.min() < above.max() < 0.018  # The cube's size is 2.
+    assert 1e-3 < above.min() < above.max() < 5e-3  # The cube's size is 2.
     assert shown > len(set(faces))
     for face in set(faces):
         heights = np.sort(above[np.array(faces) == face])
         assert (np.diff(heights) > 1e-3).all()
+
+
+def test_growing_patches_are_above_a_round_mesh_but_not_far_above_it(empty, ball, extension, touches_of):
+    touches = touches_of(ball, tolerance=0.02)
+    growing = extension.tactile_addon.whole_object.whole_mesh.GrowingPatches(
+        empty.context.scene, touches.surface
+    )
+    steps = touches.steps()
+    while len(touches.found) < 8:
+        next(steps)
+    growing.add(touches.found, touches.rims)
+    drawn = empty.data.objects["Sphere Touches"].data
+    corners = positions(drawn)[[list(face.vertices) for face in drawn.polygons]]
+    places = np.vstack([positions(drawn), corners.mean(axis=1)])
+    size, above = touches.surface.size, []
+    for place in places.tolist():
+        foot, normal, _ = touches.surface.project(tuple(place))
+        above.append(np.subtract(place, foot) @ normal)
+    assert 0.0 < min(above) < max(above) < 0.01 * size
 
 
 @pytest.mark.long
