@@ -19,11 +19,8 @@ from .rims import radial_extent
 from .touching import FIRST_EXTENT, NEAR, SIZE
 
 # python -m benchmarks.add_menu --expected judges these.
-ROUNDS, AT_ONCE = (
-    3,
-    4,
-)  # So many touches are made at once, so many times, where those before have felt nothing.
-LATER = 8  # The last ones are as large as those to come,
+ROUNDS, AT_ONCE = 3, 4  # So often so many touches are made at once, at places not felt before.
+LATER = 8  # Patches to come are as large as so many of the last,
 OVERLAP = 3.0  # and overlap, so that they have this many times the area that is left.
 FACING = 0.5  # A patch covers walls that face as it does, by this cosine or more.
 

@@ -16,10 +16,8 @@ from ..reconstruction.result import Reconstruction
 
 # benchmarks.facets shows how far curvatures are off with these.
 OTHER = 0.2  # Curvatures are those of a facet if they are off by this share of the larger one of the shape,
-SPAN, BEND = (
-    2.0,
-    math.radians(40.0),
-)  # which follows from how facets turn within so many widths and this angle,
+SPAN = 2.0  # which follows from how facets turn within this many widths,
+BEND = math.radians(40.0)  # and where the patch does not turn by more,
 TURNS = np.radians([0.0, 20.0, 40.0])  # below the curves, and below these turned around the normal.
 # Edges between these angles stand for a smooth bend,
 DISTINCT_COSINE, SMOOTH_COSINE = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))

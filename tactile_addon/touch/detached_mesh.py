@@ -107,6 +107,11 @@ class DetachedMesh(PlacedMesh):
         """The point of the mesh nearest to a place, the unit normal there, and the distance."""
         return self._foot(location, location)
 
+    def feet(self, points: Array) -> Array:
+        """The points (n, 3) of the mesh nearest to places (n, 3); the place itself if it is too far away."""
+        found = ((self._tree.find_nearest(self._to_local(at))[0], at) for at in points.tolist())
+        return np.array([at if foot is None else self._to_world(foot) for foot, at in found])
+
     def _nearest(self, local: Any) -> Any:
         return self._tree.find_nearest(local)[:2]
 

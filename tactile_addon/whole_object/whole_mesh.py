@@ -104,8 +104,7 @@ def _below(surface: DetachedMesh, points: Array, normals: Array) -> Array:
     """How far a mesh is above the points of a disk, (n,), and the middles between these along spokes."""
     inner = np.maximum(np.arange(1, len(points)) - SPOKES, 0)
     places = np.vstack([points, 0.5 * (points[1:] + points[inner])])
-    feet = np.array([surface.project(tuple(place))[0] for place in places.tolist()])
-    heights = np.sum((feet - places) * np.vstack([normals, normals[1:]]), axis=1)
+    heights = np.sum((surface.feet(places) - places) * np.vstack([normals, normals[1:]]), axis=1)
     below, between = np.split(np.maximum(heights, 0.0), [len(points)])
     below[1:] = np.maximum(below[1:], between)
     np.maximum.at(below, inner, between)
