@@ -46,7 +46,8 @@ def has_few_facets(
     """Whether a facet at the point, which stands for a smooth shape, has other curvatures than that shape.
 
     The curvatures of the shape are those by which normals turn from facet to facet. A mesh is fine if the
-    contacts lie on many facets, and these are narrow compared with the radius.
+    contacts lie on many facets, and these are narrow compared with the radius. If they lie on one, which
+    may be bent itself, the curvatures are its own.
 
     face_near : the number of the face nearest to a point (3,) of the world
     corners_of : the corners (k, 3) of a face in the world, in order
@@ -61,6 +62,7 @@ def has_few_facets(
 
     width, radius = _width(facet_near(r.frame.origin), facet_near), r.radius
     points = np.vstack([contour.points for contour in r.contours])
+    is_one_felt = len(set(map(face_near, points))) == 1
     if width < MIN_WIDTH_RATIO * radius:
         if not (width and _are_few(map(facet_near, points))):
             return False
@@ -74,7 +76,7 @@ def has_few_facets(
         return False
     turning = _turning(r, points, [shape(face) for face in faces])
     off = np.abs(turning - np.sort([r.k1, r.k2])).max()
-    return bool(off > OTHER * np.abs(turning).max())
+    return is_one_felt or bool(off > OTHER * np.abs(turning).max())
 
 
 def is_beside_bend(

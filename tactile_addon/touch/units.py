@@ -18,6 +18,7 @@ ADAPTIVE = {
 # Symbol and meters of each unit, by Blender's name.
 METERS = dict(zip((*ADAPTIVE["METRIC"], *ADAPTIVE["IMPERIAL"]), core.UNIT_METERS.items(), strict=True))
 LEAST = {"MILLIMETERS": 1e-2}  # In an adaptive unit lengths are at least 1 or this: few count micrometers.
+LEAST_SHOWN, SHOWN = 1e-4, 1e-2  # A length below the first is in a unit in which it is at least the second.
 LEAST_NUMBER = 10.0  # The unit of a whole object suits this many tolerances.
 ZERO = 1e-6  # A number below this, in units of the radius or the size, counts as 0.
 SUPERSCRIPTS = {1: "", 2: "²"}
@@ -54,11 +55,21 @@ def unit_of_colors(scene: bpy.types.Scene, report: Mapping[str, Any], power: int
 
 def say(value: float, power: int, unit: Unit, std: float | None = None) -> str:
     """A value in length^power in words, such as "0.0123 mm" or "-4.2 ± 0.3 1/mm²"."""
+    if power == 1 and 0.0 < abs(value) < LEAST_SHOWN * unit[1]:
+        unit = _finer(unit, abs(value))
     scale = unit[1] ** power
     if std is None:
         return f"{value / scale:.3g} {symbol(power, unit)}".strip()
     value, spread = known(value / scale, std / scale), float(f"{std / scale:.1g}")
     return f"{value:.3g} ± {spread:g} {symbol(power, unit)}".strip()
+
+
+def _finer(unit: Unit, length: float) -> Unit:
+    """The largest unit of the same system that suits a length; the same if it has no name or none suits."""
+    systems = ([METERS[name] for name in names] for names in ADAPTIVE.values())
+    system = next((units for units in systems if unit[0] in dict(units)), [])
+    units = ((name, unit[1] * meters / core.UNIT_METERS[unit[0]]) for name, meters in system)
+    return next((each for each in units if SHOWN * each[1] <= length), unit)
 
 
 def rounded(value: float, power: int, size: float) -> float:

@@ -187,14 +187,15 @@ class ObjectTouches:
 
     def _share(self, state: core.Progress) -> float:
         """About which share of all is done in a state of the touches."""
+        felt = 1.0 - len(self._left) / PLACES
         if not self._rounds:
-            return TOUCHED * (1.0 - len(self._left) / PLACES)
+            return TOUCHED * felt
         # How often it touches and joins again is not known before. Each round has half of what is left.
         if state.joining is None:
             done, begun = AGAIN * (1.0 - self._joined / state.done), self._rounds + 1
         else:
             done, begun = AGAIN + (1.0 - AGAIN) * state.joining, self._rounds
-        return TOUCHED + (JOINED - TOUCHED) * (1.0 - (2.0 - done) * 0.5**begun)
+        return felt * (TOUCHED + (JOINED - TOUCHED) * (1.0 - (2.0 - done) * 0.5**begun))
 
     def meshing(self, start: float = 0.0) -> Iterator[None]:
         """Makes the mesh and compares it in steps, from the share `start` of all on."""

@@ -87,3 +87,16 @@ def test_the_shape_is_compared_for_a_fiftieth_of_the_time(empty, ball, taken, ex
         now[0] += 0.25
     taken.require_same(empty.context)
     assert compared == [0.0, 51.0, 102.0]
+
+
+def test_a_touch_within_one_bent_facet_is_about_that_facet_on_a_map_too(empty, extension):
+    """A face of Suzanne's ear has four corners that are not in a plane, and curvatures of its own."""
+    empty.ops.mesh.primitive_monkey_add()
+    obj, depsgraph = empty.context.object, empty.context.evaluated_depsgraph_get()
+    empty.ops.tactile.reconstruct(target=obj.name, location=(-1.1484375, 0.375, 0.4739583))
+    patch = empty.context.object
+    assert patch["tactile"]["few_facets"]
+    assert max(abs(patch["tactile"]["k1"]), abs(patch["tactile"]["k2"])) > 0.5
+    mesh = extension.tactile_addon.touch.detached_mesh.DetachedMesh(obj, depsgraph)
+    found = extension.tactile_addon.scene.patch_record.reconstruction_of(patch)
+    assert extension.core.has_few_facets(found, mesh.face_near, mesh.corners_of)

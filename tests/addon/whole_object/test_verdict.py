@@ -277,8 +277,11 @@ def balls(empty):
 
 def progress_of(touches):
     """The words and shares of all steps."""
-    steps = [(touches.words.split()[0], touches.share) for _ in touches.steps()]
-    words, shares = zip(*steps, strict=True)
+    steps = [(touches.words.split()[0], touches.share, len(touches._left)) for _ in touches.steps()]
+    words, shares, left = zip(*steps, strict=True)
+    touching = words.index("Meshing")
+    most = [0.8 * (1.0 - number / 1000) for number in left[:touching]]  # of what is covered until then
+    assert (np.array(shares[:touching]) <= np.array(most) + 1e-9).all()
     assert list(shares) == sorted(shares)
     assert shares[-1] <= 1.0
     return words, shares
