@@ -87,7 +87,7 @@ def contradicted(r: Judged) -> tuple[str, str] | None:
         )
     if taps.missed and _is_at_edge(r):
         return "uncertain", (
-            "The point is so near an edge that taps beside it feel no surface: move the point away from that "
+            "The point is so near an edge that taps beside it feel no surface: move the point away from the "
             "edge."
         )
     if taps.missing > DOUBTFUL_GAP:
@@ -142,8 +142,8 @@ def _about_point(r: Judged) -> Iterator[str]:
         if r.contours[worst].distance_to(r.frame.origin) <= OWN_POINT * r.radius:
             yield (
                 f"Curve {worst + 1} bends so sharply at the point that its fit is "
-                f"{100.0 * distances[worst]:.2g} % of the radius off there: move the point away from that "
-                "edge, or make the facets finer."
+                f"{100.0 * distances[worst]:.2g} % of the radius off there: move the point away from edges, "
+                "or make the facets finer."
             )
             return
         yield (

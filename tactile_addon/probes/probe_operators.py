@@ -158,7 +158,7 @@ class TACTILE_OT_update(_ProbeOperator, bpy.types.Operator):
 
 
 class TACTILE_OT_add_subdivision(_ProbeOperator, bpy.types.Operator):
-    """Smooth the target by a Subdivision Surface modifier, or by one more level of the one it has"""
+    """Smooth the target by a Subdivision modifier or one more level; edges to stay sharp need a crease"""
 
     bl_idname = "tactile.add_subdivision"
     bl_label = "Add Subdivision"

@@ -147,7 +147,7 @@ def judgment(result: core.Reconstruction, error: core.MeshError, ended: str, few
     if stops:
         where = core.WHERE[Counter(stops).most_common(1)[0][0]]
         message = (
-            f"The point is {where}, so half curves end there at once: move the point away from that edge. "
+            f"The point is {where}, so half curves end there at once: move the point away from the edge. "
             f"{message}"
         )
     if few_facets:

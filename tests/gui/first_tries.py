@@ -165,7 +165,7 @@ def cubes():
     look((0, 0, 0), (1, -1, 0.6), 5)
     yield from pick(cube, (1.0, -1.0, 0.2))
     said = patch()["tactile"]["message"]
-    check("the advice for a point on an edge: move away", "move the point away from that edge" in said, said)
+    check("the advice for a point on an edge: move away", "move the point away from the edge" in said, said)
     picture("cube_edge")
     cube = only(bpy.ops.mesh.primitive_cube_add, size=1e-3)
     look((0, 0, 0), (0.5, -1, 0.6), 2.5e-3)

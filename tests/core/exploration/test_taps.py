@@ -139,7 +139,7 @@ def test_a_point_on_an_edge_gets_the_advice_to_move_away():
     r = explore(half).result
     assert r.status == "uncertain"
     assert r.message.startswith(
-        "The point is so near an edge that taps beside it feel no surface: move the point away from that "
+        "The point is so near an edge that taps beside it feel no surface: move the point away from the "
         "edge. "
     )
     assert explore(half, (0.0, -1.0, 0.0)).result.status == "ok"
