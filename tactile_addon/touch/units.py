@@ -19,7 +19,7 @@ ADAPTIVE = {
 METERS = dict(zip((*ADAPTIVE["METRIC"], *ADAPTIVE["IMPERIAL"]), core.UNIT_METERS.items(), strict=True))
 # In an adaptive unit lengths are at least 1 or this, because few count micrometers or thous.
 LEAST = {"MILLIMETERS": 1e-2, "INCHES": 1e-2}
-LEAST_SHOWN, SHOWN = 1e-3, 5e-2  # A length below the first is in a unit in which it is at least the second.
+LEAST_SHOWN, SHOWN = 1e-4, 5e-2  # A length below the first is in a unit in which it is at least the second.
 LEAST_NUMBER = 10.0  # The unit of a whole object suits this many tolerances.
 ZERO = 1e-6  # A number below this, in units of the radius or the size, counts as 0.
 SUPERSCRIPTS = {1: "", 2: "²"}

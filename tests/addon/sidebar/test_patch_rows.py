@@ -40,8 +40,8 @@ def test_a_length_far_below_its_unit_is_in_a_smaller_one(extension):
     assert say(-8.52e-8, 1, ("m", 1e-3)) == "-0.0852 mm"  # A unit of the world is a kilometer.
     assert say(8.5e-7, 1, ("cm", 0.01)) == "0.85 µm"
     assert say(2e-5, 1, ("ft", 0.3048)) == "0.787 thou"
-    assert say(1.2e-3, 1, ("m", 1.0)) == "0.0012 m"
-    assert say(2.27e-4, 1, ("m", 1.0)) == "0.227 mm"
+    assert say(1.2e-4, 1, ("m", 1.0)) == "0.00012 m"
+    assert say(9.9e-5, 1, ("m", 1.0)) == "0.099 mm"
     assert say(8.52e-5, 1, ("", 1.0)) == "8.52e-05"
     assert say(3e-9, 1, ("m", 1.0)) == "3e-09 m"  # There is no smaller one.
     assert say(0.0, 1, ("m", 1.0)) == "0 m"
