@@ -19,9 +19,9 @@ from .rims import radial_extent
 from .touching import FIRST_EXTENT, NEAR, SIZE
 
 # python -m benchmarks.add_menu --expected judges these.
-ROUNDS, AT_ONCE = 3, 4  # So often so many touches are made at once, at places not felt before.
-LATER = 8  # Patches to come are as large as so many of the last,
-OVERLAP = 3.0  # and overlap, so that they have this many times the area that is left.
+ROUNDS, AT_ONCE = 3, 4  # The rounds, and the touches of each, at places that none before covers.
+LATER = 8  # The last patches, this number of them, are as large as those to come,
+OVERLAP = 3.0  # which overlap, so that they have this many times the area that is left.
 FACING = 0.5  # A patch covers walls that face as it does, by this cosine or more.
 
 

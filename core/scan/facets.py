@@ -62,9 +62,9 @@ def has_few_facets(
 
     width, radius = _width(facet_near(r.frame.origin), facet_near), r.radius
     points = np.vstack([contour.points for contour in r.contours])
-    is_one_felt = len(set(map(face_near, points))) == 1
+    felt = set(map(face_near, points))
     if width < MIN_WIDTH_RATIO * radius:
-        if not (width and _are_few(map(facet_near, points))):
+        if not (width and _are_few(map(shape, felt))):
             return False
         radius *= 0.5
     # Where facets narrow, as near the tip of a cone, their widths would reach around it and beyond the tip.
@@ -76,7 +76,7 @@ def has_few_facets(
         return False
     turning = _turning(r, points, [shape(face) for face in faces])
     off = np.abs(turning - np.sort([r.k1, r.k2])).max()
-    return is_one_felt or bool(off > OTHER * np.abs(turning).max())
+    return len(felt) == 1 or bool(off > OTHER * np.abs(turning).max())
 
 
 def is_beside_bend(
