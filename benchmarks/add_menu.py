@@ -5,7 +5,7 @@
 `python -m benchmarks.add_menu ZIP [--only NAME]`, from the root of a checkout; ZIP is the built extension.
 It prints a Markdown table and draws build/charts/add_menu.jpg, objects above and what was felt of them below.
 With --scans the objects are a cube and the scans of a bottle and of a pear, in build/charts/touched.jpg.
-With --expected it only prints how many touches the dialog expects of each, which takes seconds.
+With --expected it only prints how many touches and seconds the dialog expects of each.
 
 Deviations are those of the report, both ways between surface and object, in tolerances (1/500 of the size).
 Open edges, Euler number and pieces are of the touched surface, and in brackets of the object where these
@@ -96,13 +96,13 @@ def touched(add):
 
 
 def expected(addon, add):
-    """How many touches the dialog expects of the object that a function adds."""
+    """How many touches the dialog expects of the object that a function adds, and seconds."""
     import bpy
 
     add()
     mesh = addon.touch.detached_mesh.DetachedMesh(bpy.context.object, bpy.context.evaluated_depsgraph_get())
     tolerance = addon.whole_object.object_touches.tolerance_of(mesh.size, "normal", 0.0)
-    return addon.whole_object.expected.expected(mesh, tolerance, 0.0)[0]
+    return addon.whole_object.expected.expected(mesh, tolerance, 0.0)
 
 
 def shape_of(obj, *, merged):
@@ -181,7 +181,7 @@ def main():
     parser.add_argument("zip", type=Path, help="the built extension")
     parser.add_argument("--only", default="", help="only objects with this in their names")
     parser.add_argument("--scans", action="store_true", help="a cube, a bottle and a pear instead")
-    parser.add_argument("--expected", action="store_true", help="print only the touches that are expected")
+    parser.add_argument("--expected", action="store_true", help="print only what the dialog expects")
     options = parser.parse_args()
     rows, pairs = [], []
     with blender.quiet():
@@ -190,9 +190,10 @@ def main():
 
         bpy.ops.wm.read_homefile(use_empty=True)
         if options.expected:
-            rows = [[name, f"{expected(addon, add)}"] for name, add in shapes().items()]
+            found = ((name, *expected(addon, add)) for name, add in shapes().items())
+            rows = [[name, f"{touches}", f"{seconds:.0f}"] for name, touches, seconds in found]
     if options.expected:
-        table(["object", "touches expected"], rows)
+        table(["object", "touches expected", "seconds expected"], rows)
         return
     with blender.quiet():
         for name, add in (scans() if options.scans else shapes()).items():

@@ -8,7 +8,7 @@ has negative curvatures, because normals point outward.
 
 from .atlas.boundaries import Edge
 from .atlas.curvature import vertices_shown
-from .atlas.expected import covered_by, expected_touches
+from .atlas.expected import covered_by, expected_touches, thinnest_wall
 from .atlas.measured import atlas_of, cover_contacts
 from .atlas.meshing import Mesh, shortest_edge
 from .atlas.object_atlas import Atlas, NextTouch
@@ -115,6 +115,7 @@ __all__ = [
     "spaced_count",
     "stops_at",
     "suggest_plane",
+    "thinnest_wall",
     "to_dict",
     "touch_all_over",
     "track",

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How far touches all over an object are: about how many they will be, and which places they have covered."""
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -16,12 +18,14 @@ from ..reconstruction.result import Reconstruction
 from ..steps import result_of
 from .finger import finger_at
 from .rims import radial_extent
+from .samples import OPPOSITE, THIN_SHARE
 from .touching import FIRST_EXTENT, NEAR, SIZE
 
 # python -m benchmarks.add_menu --expected judges these.
 ROUNDS, AT_ONCE = 3, 4  # The rounds, and the touches of each, at places that none before covers.
 LATER = 8  # The last patches, this number of them, are as large as those to come,
 OVERLAP = 3.0  # which overlap, so that they have this many times the area that is left.
+INSIDE = 1e-4  # Rays across walls begin this share of the size below the surface.
 FACING = 0.5  # A patch covers walls that face as it does, by this cosine or more.
 
 
@@ -70,6 +74,26 @@ def expected_touches(
         raise ValueError("points: expected some where a patch can be felt, got none")
     more = OVERLAP * area * len(left) / len(p) * float(np.mean(1.0 / np.array(areas[-LATER:])))
     return len(areas) + more, tried
+
+
+def thinnest_wall(surface: Surface, points: ArrayLike, outward: ArrayLike, size: float) -> float:
+    """The thickness that all but the share THIN_SHARE of the walls of an object exceed; inf if it has none.
+
+    points, outward : (n, 3), places spread evenly over the object, and the outward directions there
+    size : of the object; walls are thinner
+
+    Raises ValueError for bad arguments. A wall's sides face opposite ways, as for `Samples.thickness`.
+    """
+    p, up = (finite_array(*given, (None, 3), LARGEST) for given in (("points", points), ("outward", outward)))
+    size = number("size", size, above=0.0)
+    inward = -np.array([unit_vector("outward", direction) for direction in up])
+    starts = p + INSIDE * size * inward  # It is off the surface, which the ray would meet.
+    hits = [surface.ray_cast(vector_of(a), vector_of(b), size) for a, b in zip(starts, inward, strict=True)]
+    thickness = [
+        math.dist(hit[0], point) if hit is not None and np.dot(hit[1], way) > -OPPOSITE else math.inf
+        for hit, point, way in zip(hits, p, inward, strict=True)
+    ]
+    return sorted(thickness)[int(THIN_SHARE * len(p))]
 
 
 def _rim(surface: Surface, e: Exploration, outward: Array, tolerance: float) -> Array:

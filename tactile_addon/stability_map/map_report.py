@@ -10,6 +10,7 @@ import bpy
 from ...core.arguments import many
 from ..touch import units
 from ..touch.units import Unit
+from ..touch.wording import fit
 from . import map_object
 from .stability import REASONS
 
@@ -28,7 +29,7 @@ def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ),
         ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
         ("refused", ", ".join(_refused(record)) or "none"),
-        ("fit", f"{record['method']}, degree {record['degree']}"),
+        ("fit", fit(record)),
         (", ".join(names), ", ".join(lengths)),
         *((f"median {title.lower()}", value) for _, title, value in _medians(record, unit)),
     ]

@@ -11,6 +11,7 @@ import numpy as np
 
 from ... import core
 from ...core.arguments import many
+from .settings import METHODS
 from .touch_report import Registration, SuggestedPlane, TouchReport
 from .units import Unit, known, length, rounded, say, unit_of
 
@@ -27,13 +28,13 @@ def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
     return [
         ("touched", report["source"]),
         ("verdict", f"{verdict(report, unit)}. {report['message']}"),
-        ("fit", f"{report['method']}, degree {report['degree']}"),
+        ("fit", fit(report)),
         ("contacts", contacts),
         *_lengths(report, unit),
         *([("more planes", added_planes(report, unit))] if report.get("added_planes") else []),
         ("point", f"{vector(np.divide(report['frame']['origin'], unit[1]))} {unit[0]}".rstrip()),
         ("normal", vector(report["frame"]["normal"])),
-        ("direction d1", vector(report["frame"]["d1"])),
+        ("first principal direction", vector(report["frame"]["d1"])),
         ("principal curvatures", ", ".join(_measured(report, key, -1, unit) for key in ("k1", "k2"))),
         ("Gaussian curvature", _measured(report, "gaussian_curvature", -2, unit)),
         ("mean curvature", _measured(report, "mean_curvature", -1, unit)),
@@ -49,6 +50,12 @@ def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
         ("condition number", f"{report['condition_number']:.2g}"),
         ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in seconds.items())),
     ]
+
+
+def fit(report: Mapping[str, Any]) -> str:
+    """How a touch or a map is fitted, as the panel names it, such as "Bayesian, degree 6"."""
+    name = next(label for name, label, _ in METHODS if name == report["method"])
+    return f"{name}, degree {report['degree']}"
 
 
 def verdict(report: TouchReport, unit: Unit) -> str:

@@ -20,6 +20,7 @@ PLACES, SEED = 600, 0  # A few of so many random places are touched for the esti
 # The time of a touch with its part of joining, and that of a mesh, as multiples of the time of a touch that
 # is tried: python -m benchmarks.add_menu.
 JOINING, MESHING = 3.3, 60.0
+THIN = 16.0  # Walls thinner than the size by more than this factor have shorter edges, a quarter of a wall.
 
 
 class Expected:
@@ -52,12 +53,15 @@ class Expected:
 
 def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, float]:
     """About how many touches a DetachedMesh takes, and seconds. Raises ValueError if none is possible."""
-    begin = perf_counter()
+    import scipy.interpolate  # noqa: F401  # The import takes half a second, which is not a touch's.
+
     area = 0.5 * float(np.linalg.norm(triangle_cross(mesh.points[mesh.triangles]), axis=1).sum())
     places = core.scattered(mesh.points, mesh.triangles, PLACES, np.random.default_rng(SEED))
+    begin = perf_counter()
     touches, tried = core.expected_touches(mesh, *places, area, tolerance=tolerance, noise=noise, rng=SEED)
     each = (perf_counter() - begin) / tried
-    return _rounded(touches), (MESHING + JOINING * touches) * each
+    meshing = MESHING * max(1.0, mesh.size / (THIN * core.thinnest_wall(mesh, *places, mesh.size))) ** 2
+    return _rounded(touches), (meshing + JOINING * touches) * each
 
 
 def _rounded(number: float) -> int:

@@ -302,6 +302,29 @@ def handles():
     yield from until(is_complete)
     moved = probe().matrix_world.translation - before
     check("... and one Ctrl Z takes it back", moved.length < 1e-5 * max(1.0, before.length), moved)
+    yield from seen_from_behind(axes)
+
+
+def seen_from_behind(axes):
+    """Drags the point where the object hides it: it slides over what is in front, felt from outside."""
+    before = probe().matrix_world.translation.copy()
+    look(before, -axes.col[2].xyz, 6.0 * extent(probe()))
+    yield 1
+    at = gui.view_point(before)
+    gui.drag(at, (at[0] + 20, at[1] + 10))
+    yield 1
+    yield from until(is_complete)
+    target, there = bpy.data.objects[TARGET], probe().matrix_world
+    local = target.matrix_world.inverted() @ there.translation
+    outward = target.matrix_world.to_3x3() @ target.closest_point_on_mesh(local)[2]
+    check(
+        "seen from behind, the point comes to the front", (there.translation - before).length > 0.2 * unit()
+    )
+    check("... and is felt from outside", outward.dot(there.col[2].xyz) > 0.0)
+    picture("slid_from_behind")
+    press("ctrl+z")
+    yield 1
+    yield from until(is_complete)
 
 
 def tilt_seen_steeply(axes):

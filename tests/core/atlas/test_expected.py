@@ -65,6 +65,31 @@ def test_the_narrow_walls_of_a_plate_are_not_covered_by_its_wide_ones():
     assert tried == 12
 
 
+def test_walls_are_as_thick_as_from_side_to_side():
+    ball, plate = solids.ball(), solids.block(0.5, 0.5, 0.005)
+    assert core.thinnest_wall(ball, AROUND, AROUND, 2.5) == pytest.approx(2.0, rel=1e-6)
+    assert core.thinnest_wall(ball, AROUND, AROUND, 1.5) == np.inf  # Nothing is met within this size.
+    points, normals = on_block((0.5, 0.5, 0.005), 1000)
+    assert core.thinnest_wall(plate, points, normals, 1.0) == pytest.approx(0.01, rel=1e-6)
+    narrow = np.abs(normals[:, 2]) < 0.5
+    assert core.thinnest_wall(plate, points[narrow], normals[narrow], 1.1) == pytest.approx(1.0, rel=1e-6)
+    assert core.thinnest_wall(plate, points[narrow], normals[narrow], 0.9) == np.inf
+    with pytest.raises(ValueError, match="size: expected a finite number above 0, got 0"):
+        core.thinnest_wall(plate, points, normals, 0.0)
+
+
+def test_a_wedge_has_no_thickness():
+    """Its sides do not face opposite ways."""
+
+    class Wedge:
+        """A ray inward meets a side that leans by 45 degrees."""
+
+        def ray_cast(self, origin, direction, distance):
+            return np.add(origin, 0.1 * np.array(direction)), np.array([np.sqrt(0.5), 0.0, np.sqrt(0.5)])
+
+    assert core.thinnest_wall(Wedge(), [(0.0, 0.0, 0.0)], [(0.0, 0.0, -1.0)], 1.0) == np.inf
+
+
 def test_it_is_refused_where_no_patch_can_be_felt():
     with pytest.raises(ValueError, match="points: expected some where a patch can be felt, got none"):
         core.expected_touches(solids.ball(), [(0, 0, 3.0)], [(0, 0, 1.0)], 1.0, tolerance=4e-3)
