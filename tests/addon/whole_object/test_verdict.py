@@ -275,29 +275,35 @@ def balls(empty):
     return empty.context.object
 
 
-def progress_of(touches):
+def progress_of(touches, core):
     """The words and shares of all steps."""
-    steps = [(touches.words.split()[0], touches.share, len(touches._left)) for _ in touches.steps()]
-    words, shares, left = zip(*steps, strict=True)
+    surface, rng = touches.surface, np.random.default_rng(0)
+    left = core.scattered(surface.points, surface.triangles, 1000, rng)[0]
+    steps, count = [], 0
+    for _ in touches.steps():
+        for r, rim in zip(touches.found[count:], touches.rims[count:], strict=True):
+            left = left[~core.covered_by(r, rim, left, touches.tolerance)]
+        count = len(touches.found)
+        steps.append((touches.words.split()[0], touches.share, 1.0 - len(left) / 1000))
+    words, shares, felt = zip(*steps, strict=True)
     touching = words.index("Meshing")
-    most = [0.8 * (1.0 - number / 1000) for number in left[:touching]]  # of what is covered until then
-    assert (np.array(shares[:touching]) <= np.array(most) + 1e-9).all()
+    assert (np.array(shares[:touching]) <= 0.8 * np.array(felt[:touching]) + 1e-9).all()
     assert list(shares) == sorted(shares)
     assert shares[-1] <= 1.0
     return words, shares
 
 
 @pytest.mark.long
-def test_touching_is_half_of_the_progress(empty, touches_of):
+def test_touching_is_half_of_the_progress(empty, touches_of, extension):
     empty.ops.mesh.primitive_cylinder_add(vertices=8)
-    words, shares = progress_of(touches_of(empty.context.object, tolerance=0.02))
+    words, shares = progress_of(touches_of(empty.context.object, tolerance=0.02), extension.core)
     assert 0.4 < shares[words.index("Joining") - 1] <= 0.5
     assert words[-1] == "Comparing"
 
 
 @pytest.mark.long
-def test_progress_never_runs_backward_and_goes_on_with_touches(balls, touches_of):
-    words, shares = progress_of(touches_of(balls, tolerance=0.02))
+def test_progress_never_runs_backward_and_goes_on_with_touches(balls, touches_of, extension):
+    words, shares = progress_of(touches_of(balls, tolerance=0.02), extension.core)
     again = [i for i, word in enumerate(words) if i > words.index("Joining") and word[0].isdigit()]
     assert again and "Joining" in words[again[-1] :]
     assert len({shares[i] for i in again}) >= len({words[i] for i in again}) > 3
