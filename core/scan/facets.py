@@ -11,14 +11,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import Array
-from ..contours.local_geometry import Frame
+from ..patch.differential_geometry import Derivatives
 from ..reconstruction.result import Reconstruction
 
 # benchmarks.facets shows how far curvatures are off with these.
-OTHER = 0.2  # Curvatures are those of a facet if they are off by this share of the larger one of the shape,
-SPAN = 2.0  # which follows from how facets turn within this many widths,
-BEND = math.radians(40.0)  # and where the patch does not turn by more,
-TURNS = np.radians([0.0, 20.0, 40.0])  # below the curves, and below these turned around the normal.
+OTHER = 0.2  # Curvatures are those of a facet if they are off by this share of the larger one of the shape.
+# That is by how facets turn within the first number of widths, or by corners of facets within the second one
+# if those within the third one have the same curvatures. No facet is where the patch turns by more than BEND.
+TURNING, NEAR, FAR = 2.0, 0.6, 1.3
+BEND = math.radians(40.0)
+TURNS = np.radians(
+    [0.0, 20.0, 40.0]
+)  # Facets are below the curves, and below these turned around the normal.
 # Edges between these angles stand for a smooth bend,
 DISTINCT_COSINE, SMOOTH_COSINE = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))
 # if both facets have this share of the wider one's width across it, and of the radius; else one is a fillet.
@@ -45,14 +49,14 @@ def has_few_facets(
 ) -> bool:
     """Whether a facet at the point, which stands for a smooth shape, has other curvatures than that shape.
 
-    The curvatures of the shape are those by which normals turn from facet to facet. A mesh is fine if the
-    contacts lie on many facets, and these are narrow compared with the radius. If they lie on one, which
-    may be bent itself, the curvatures are its own.
+    The curvatures of the shape are those by which normals turn from facet to facet, or those of the corners
+    of facets, whichever are nearer. A mesh is fine if the contacts lie on many facets, and these are narrow
+    compared with the radius. If they lie on one, which may be bent itself, the curvatures are its own.
 
     face_near : the number of the face nearest to a point (3,) of the world
     corners_of : the corners (k, 3) of a face in the world, in order
 
-    Facets whose edges are all sharp, as those of a cube, are the shape itself.
+    A facet whose edges are all sharp or those of fillets, as that of a cube, is the shape itself.
     """
     shape = cache(lambda face: _facet(corners_of(face)))
 
@@ -60,23 +64,24 @@ def has_few_facets(
         """The face nearest to a point (3,)."""
         return shape(face_near(at))
 
-    width, radius = _width(facet_near(r.frame.origin), facet_near), r.radius
-    points = np.vstack([contour.points for contour in r.contours])
-    felt = set(map(face_near, points))
+    here, radius = facet_near(r.frame.origin), r.radius
+    width = _width(here, facet_near)
+    felt = set(map(face_near, np.vstack([contour.points for contour in r.contours])))
     if width < MIN_WIDTH_RATIO * radius:
         if not (width and _are_few(map(shape, felt))):
             return False
         radius *= 0.5
-    # Where facets narrow, as near the tip of a cone, their widths would reach around it and beyond the tip.
-    reach = 1.0 / max(abs(r.k1) / BEND, abs(r.k2) / BEND, 1.0 / (SPAN * width))
-    points = _turned(r.frame, r.frame.origin + reach / r.radius * (points - r.frame.origin))
-    faces = [face_near(point) for point in points]
-    around, wide = map(shape, set(faces)), max(width, radius)
-    if not any(_is_smooth(facet, wide, facet_near) for facet in around):
+    if not _is_smooth(here, max(width, radius), facet_near):
         return False
-    turning = _turning(r, points, [shape(face) for face in faces])
-    off = np.abs(turning - np.sort([r.k1, r.k2])).max()
-    return len(felt) == 1 or bool(off > OTHER * np.abs(turning).max())
+    if len(felt) == 1:
+        return True
+    points = _around(r, TURNING * width)
+    turning = _turning(r, points, [facet_near(point) for point in points])
+    near, far = (
+        _of_corners(r, map(shape, set(map(face_near, _around(r, share * width))))) for share in (NEAR, FAR)
+    )
+    found = np.sort([r.k1, r.k2])
+    return _is_off(found, turning) and (_is_off(found, near) or _is_off(far, near))
 
 
 def is_beside_bend(
@@ -90,11 +95,16 @@ def is_beside_bend(
     return _is_smooth(facet, 0.0, lambda at: _facet(corners_of(face_near(at))))
 
 
-def _turned(frame: Frame, points: Array) -> Array:
-    """Points (n, 3) of the world, turned by TURNS around the normal of a frame, (len(TURNS) n, 3)."""
-    x, y, z = frame.to_local(points).T
+def _around(r: Reconstruction, reach: float) -> Array:
+    """Points (n, 3) of the world along the curves, out to a length, and these turned around the normal.
+
+    Where facets narrow, as near the tip of a cone, the points reach no farther than the patch turns by BEND.
+    """
+    reach = 1.0 / max(abs(r.k1) / BEND, abs(r.k2) / BEND, 1.0 / reach)
+    points = np.vstack([contour.points for contour in r.contours])
+    x, y, z = reach / r.radius * r.frame.to_local(points).T
     turned = [(x * c - y * s, x * s + y * c, z) for c, s in zip(np.cos(TURNS), np.sin(TURNS), strict=True)]
-    return frame.to_world(np.concatenate(turned, axis=1).T)
+    return r.frame.to_world(np.concatenate(turned, axis=1).T)
 
 
 def _are_few(facets: Iterable[Facet]) -> bool:
@@ -123,6 +133,19 @@ def _turning(r: Reconstruction, points: Array, facets: list[Facet]) -> Array:
     weights, turned = np.tile(weights, 2), -outward * np.concatenate([a, b])
     xx, xy, yy = np.linalg.lstsq(weights[:, None] * rows, weights * turned, rcond=None)[0]
     return np.linalg.eigvalsh([[xx, xy], [xy, yy]])
+
+
+def _of_corners(r: Reconstruction, facets: Iterable[Facet]) -> Array:
+    """The principal curvatures (2,), in order, of the height of degree 2 that fits the corners of facets."""
+    x, y, z = r.frame.to_local(np.vstack([facet.corners for facet in facets])).T / r.radius
+    taylor = np.column_stack([np.ones_like(x), x, y, 0.5 * x**2, x * y, 0.5 * y**2])
+    fitted = Derivatives(*np.linalg.lstsq(taylor, z, rcond=None)[0])
+    return np.array(fitted.principal_curvatures) / r.radius
+
+
+def _is_off(curvatures: Array, shape: Array) -> bool:
+    """Whether principal curvatures (2,), in order, are off those of the shape, (2,), by more than OTHER."""
+    return bool(np.abs(curvatures - shape).max() > OTHER * np.abs(shape).max())
 
 
 def _width(facet: Facet, facet_near: Callable[[Array], Facet]) -> float:

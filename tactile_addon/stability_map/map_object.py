@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 from bpy.props import EnumProperty
+from mathutils import Vector
 
 from ... import core
 from ..scene import colors, patch_object, patch_record
@@ -157,14 +158,22 @@ def swatches(painted: Object) -> list[tuple[str, tuple[float, ...]]]:
 
 
 def touched_near(painted: Object, location: list[float]) -> list[float]:
-    """The point nearest to a location at which a map was touched.
+    """The point at which a map was touched for its face nearest to a location, which has the color of that.
 
-    It is the location itself if that point is farther away than the map is large: the target was moved.
+    It is the location itself if the map is hidden, or if that point is farther away than the map is large:
+    the target was moved.
     """
-    places = _applied(_array(painted.matrix_world), np.reshape(painted.get(PLACES, ()), (-1, 3)))
-    away = np.linalg.norm(places - np.array(location), axis=1)
-    is_near = len(away) > 0 and away.min() <= max(painted.dimensions)
-    return places[np.argmin(away)].tolist() if is_near else location
+    local = painted.matrix_world.inverted_safe() @ Vector(location)
+    try:
+        is_found, _, _, face = painted.closest_point_on_mesh(local)
+    except RuntimeError:
+        return location
+    if not is_found:
+        return location
+    touch = painted.data.attributes[TOUCH].data[painted.data.polygons[face].loop_start].value
+    place = painted.matrix_world @ Vector(painted[PLACES][3 * touch : 3 * touch + 3])
+    is_near = (place - Vector(location)).length <= max(painted.dimensions)
+    return list(place) if is_near else location
 
 
 def _array(matrix: Any) -> Array:

@@ -556,6 +556,27 @@ def test_a_probe_finds_the_place_that_a_map_touched(empty, vase, extension):
         assert (vase.matrix_world @ foot - place).length < 1e-5
         assert np.allclose(touched_near(painted, place + Vector((0.02, 0.0, 0.0))), place)
     assert touched_near(painted, (50.0, 0.0, 0.0)) == (50.0, 0.0, 0.0)
+    painted.hide_viewport = True
+    empty.context.view_layer.update()
+    assert touched_near(painted, (3.0, 1.0, 0.0)) == (3.0, 1.0, 0.0)  # Its colors are not seen.
+
+
+def test_a_probe_finds_the_place_whose_color_a_face_has(empty, extension):
+    """On a default sphere some places of a face are nearer to the place of its neighbor."""
+    empty.ops.mesh.primitive_uv_sphere_add()
+    ball = empty.context.object
+    painted, _ = stability_map(empty, spacing=0.5, extent=0.3)
+    touched_near = extension.tactile_addon.stability_map.map_object.touched_near
+    places = np.reshape(painted["tactile_places"], (-1, 3))
+    touch = values(painted.data, "touch").astype(int)
+    others = 0
+    for face in ball.data.polygons:
+        shown = places[touch[face.loop_start]]
+        for corner in face.vertices:
+            at = 0.1 * face.center + 0.9 * ball.data.vertices[corner].co
+            assert np.allclose(touched_near(painted, at), shown, atol=1e-6)
+            others += np.linalg.norm(places - at, axis=1).min() < np.linalg.norm(shown - at) - 1e-3
+    assert others > 10
 
 
 def test_wide_faces_have_the_values_of_their_own_touches_and_not_of_narrow_ones_beside(empty):
