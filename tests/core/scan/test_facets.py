@@ -262,6 +262,34 @@ def test_facets_that_are_long_across_a_smooth_bend_are_felt(ball):
     assert wrong == 0
 
 
+def spheroid_curvatures(point, height):
+    """The principal curvatures (2,), in order, of a ball that is scaled along its axis."""
+    sine = point[2] / height / math.hypot(point[0], point[1], point[2] / height)
+    wide = math.sqrt(sine**2 + height**2 * (1.0 - sine**2))
+    return np.sort([-height / wide**3, -height / wide])
+
+
+def test_curvatures_of_flattened_balls_are_seldom_wrongly_said_to_be_those_of_facets():
+    """They change within a facet or two, which corners of facets show and their normals do not."""
+    rng, called, wrongly, wrong = np.random.default_rng(0), 0, 0, 0
+    for height in (0.2, 0.3):
+        ball = Mesh(uv_ball(32, 16).corners * (1.0, 1.0, height))
+        for share, turn in rng.random((40, 2)):
+            across, turn = 0.97 * math.sqrt(share), 2.0 * math.pi * turn
+            above = across * math.cos(turn), across * math.sin(turn), 2.0
+            point, normal = ball.ray_cast(above, (0.0, 0.0, -1.0), 4.0)
+            r = core.explore(ball, point, normal).result
+            exact = spheroid_curvatures(point, height)
+            off = np.abs(np.sort([r.k1, r.k2]) - exact).max() / -exact[0]
+            few = core.has_few_facets(r, ball.face_near, ball.corners_of)
+            called += few
+            wrongly += few and off < 0.15
+            wrong += r.status == "ok" and off > 0.25 and not few
+    assert called > 25
+    assert wrongly <= 9  # By normals only there are 14.
+    assert wrong <= 5
+
+
 def cone(segments):
     """Blender's cone, of radius 1 and height 2, around the origin."""
     angles = 2.0 * math.pi / segments * np.arange(segments + 1)
