@@ -31,6 +31,14 @@ def symmetric_range(values: Array, floor: float) -> float:
     return max(float(one + (at - before) * (other - one)), floor)
 
 
+def range_by_area(values: Array, areas: Array, floor: float) -> float:
+    """The same range where values (n,) stand for areas (n,) of unequal size."""
+    sizes = np.abs(values)
+    order = np.argsort(sizes)
+    areas = np.cumsum(areas[order])
+    return max(float(sizes[order[np.searchsorted(areas, (1.0 - FEW) * areas[-1])]]), floor)
+
+
 def are_as_good_as_0(values: Array, stds: Array) -> bool:
     """Whether nearly all values (n,) differ from 0 by less than their deviations (n,)."""
     return bool(np.mean(np.abs(values) > SIGNIFICANT * stds) <= FEW)

@@ -178,7 +178,8 @@ class ObjectTouches:
         if state.joining is None:
             self._is_joining = False
             # The last touches may still end when it is stopped.
-            self.words = f"Joining {patches}" if self.is_stopped else f"{touches}, goes on at {places}"
+            goes_on = f"{touches}, goes on at {places}" if state.uncovered else touches
+            self.words = f"Joining {patches}" if self.is_stopped else goes_on
         else:
             self._rounds += not self._is_joining
             self._is_joining, self._joined = True, state.done

@@ -44,7 +44,7 @@ class GrowingPatches:
         with undo.after_step():  # There is an undo step when the operator ends.
             undo.note_added(obj)
         obj.data.materials.append(emission("Tactile Surface", attribute=COLOR))
-        self._patches: list[tuple[Array, Array, Array]] = []
+        self._patches: list[tuple[Array, Array, Array, Array]] = []
         self._uid, self._size, self._surface = obj.session_uid, surface.size, surface
         self._placed = np.zeros((0, 8))  # The origin, normal, reach and layer of each patch.
         show_colors()
@@ -59,12 +59,13 @@ class GrowingPatches:
             points, normals, k, curvedness = _disk(r, rim)
             layer = min(LAYER * self._size, OWN_LAYER * float(np.median(rim)))
             above = _below(self._surface, points, normals) + layer * (1 + self._layer(r.frame, rim.max()))
-            self._patches.append((points + above[:, None] * normals, k, curvedness))
-        points, k, curvedness = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
+            areas = np.full(len(k), np.mean(rim**2))
+            self._patches.append((points + above[:, None] * normals, k, curvedness, areas))
+        points, k, curvedness, areas = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
         count = 1 + SPOKES * len(RINGS)
         triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
         floor = least_gaussian_range(curvedness, LEAST_BEND / self._size**2)
-        shades = colors.diverging(k, colors.symmetric_range(k, floor))
+        shades = colors.diverging(k, colors.range_by_area(k, areas, floor))
         shades.reshape(-1, count, 4)[:, -SPOKES:] = RIM_COLOR
         fill(obj.data, points, triangles, [(COLOR, shades)])
 

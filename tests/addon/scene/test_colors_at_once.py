@@ -335,3 +335,13 @@ def test_a_patch_that_is_curved_in_part_has_the_range_of_its_curvature(empty):
         wild = np.percentile(np.abs(values(patch.data, "gaussian_curvature")), 98.0)
         assert patch["tactile"]["own_limit"] == pytest.approx(wild, rel=0.3)
         assert patch["tactile"]["color_limit"] < 7.0
+
+
+def test_small_areas_do_not_set_a_range(extension):
+    """As of tiny patches, whose curvatures may be wild, among those that grow over an object."""
+    colors = extension.tactile_addon.scene.colors
+    values, areas = np.repeat([-1.0, 50.0], [90, 10]), np.repeat([1.0, 0.01], [90, 10])
+    assert colors.symmetric_range(values, 0.5) == pytest.approx(50.0)
+    assert colors.range_by_area(values, areas, 0.5) == 1.0
+    assert colors.range_by_area(values, np.ones(100), 0.5) == 50.0
+    assert colors.range_by_area(values, areas, 2.0) == 2.0
