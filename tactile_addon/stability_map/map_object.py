@@ -160,15 +160,15 @@ def swatches(painted: Object) -> list[tuple[str, tuple[float, ...]]]:
 def touched_near(painted: Object, location: list[float]) -> list[float]:
     """The point at which a map was touched for its face nearest to a location, which has the color of that.
 
-    It is the location itself if the map is hidden, or if that point is farther away than the map is large:
-    the target was moved.
+    It is the location itself if the object is no map or is hidden, or if that point is farther away than the
+    map is large: the target was moved.
     """
     local = painted.matrix_world.inverted_safe() @ Vector(location)
     try:
         is_found, _, _, face = painted.closest_point_on_mesh(local)
-    except RuntimeError:
+    except RuntimeError:  # It is hidden.
         return location
-    if not is_found:
+    if not is_found or TOUCH not in painted.data.attributes:
         return location
     touch = painted.data.attributes[TOUCH].data[painted.data.polygons[face].loop_start].value
     place = painted.matrix_world @ Vector(painted[PLACES][3 * touch : 3 * touch + 3])

@@ -577,6 +577,7 @@ def test_a_probe_finds_the_place_whose_color_a_face_has(empty, extension):
             assert np.allclose(touched_near(painted, at), shown, atol=1e-6)
             others += np.linalg.norm(places - at, axis=1).min() < np.linalg.norm(shown - at) - 1e-3
     assert others > 10
+    assert touched_near(ball, (0.0, 0.0, 1.0)) == (0.0, 0.0, 1.0)  # It is no map.
 
 
 def test_wide_faces_have_the_values_of_their_own_touches_and_not_of_narrow_ones_beside(empty):
