@@ -157,21 +157,28 @@ def swatches(painted: Object) -> list[tuple[str, tuple[float, ...]]]:
     return [(f"{name}: {counts[key]}", tuple(c)) for (key, name, _), c in names if counts[key]]
 
 
-def touched_near(painted: Object, location: list[float]) -> list[float]:
-    """The point at which a map was touched for its face nearest to a location, which has the color of that.
+def touched_near(painted: Object, source: Object, location: list[float]) -> list[float]:
+    """The point at which a map was touched for the face of its source that is nearest to a location.
 
-    It is the location itself if the object is no map or is hidden, or if that point is farther away than the
-    map is large: the target was moved.
+    The map shows the color of that point on this face. It is the location itself if the object is no map or
+    is hidden, or if it has other faces than its source. So it is if that point is farther away than the map
+    is large: the source was moved.
     """
-    local = painted.matrix_world.inverted_safe() @ Vector(location)
-    try:
-        is_found, _, _, face = painted.closest_point_on_mesh(local)
-    except RuntimeError:  # It is hidden.
+    if TOUCH not in painted.data.attributes or not painted.visible_get():
         return location
-    if not is_found or TOUCH not in painted.data.attributes:
+    depsgraph, faces = bpy.context.evaluated_depsgraph_get(), painted.data.polygons
+    evaluated = source.evaluated_get(depsgraph)
+    # The map itself is drawn above the source, so that in hollows another of its faces may be nearer.
+    is_found, _, _, face = evaluated.closest_point_on_mesh(
+        source.matrix_world.inverted_safe() @ Vector(location)
+    )
+    if not is_found or len(evaluated.data.polygons) != len(faces):
         return location
-    touch = painted.data.attributes[TOUCH].data[painted.data.polygons[face].loop_start].value
-    place = painted.matrix_world @ Vector(painted[PLACES][3 * touch : 3 * touch + 3])
+    touch = painted.data.attributes[TOUCH].data[faces[face].loop_start].value
+    found = painted.get(PLACES, ())[3 * touch : 3 * touch + 3]
+    if len(found) < 3:  # It was joined with another object.
+        return location
+    place = painted.matrix_world @ Vector(found)
     is_near = (place - Vector(location)).length <= max(painted.dimensions)
     return list(place) if is_near else location
 

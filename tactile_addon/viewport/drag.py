@@ -125,14 +125,17 @@ class TACTILE_OT_drag(bpy.types.Operator):
             if not context.region_data.is_perspective:
                 origin -= space.clip_end * direction
             hit = surface.ray_cast(origin.to_tuple(), direction.to_tuple(), 4.0 * space.clip_end)
-            outward = Vector(surface.project(self._matrix.translation.to_tuple())[1])
+            if hit is None:
+                return
+            upright, normal = self._matrix.col[2].xyz.normalized(), Vector(hit[1])
+            if upright.dot(direction) < 0.0:  # Seen from its side, it faces the eye.
+                is_turned = normal.dot(direction) > 0.0
+            else:  # Seen from behind, it stays inside or outside the mesh.
+                _, outward, _ = surface.project(self._matrix.translation.to_tuple())
+                is_turned = upright.dot(outward) < 0.0
         except (ValueError, AttributeError):  # The target is gone or cannot be touched; the panel says so.
             return
-        if hit is None:
-            return
-        upright, normal = self._matrix.col[2].xyz.normalized(), Vector(hit[1])
-        # Seen from its side, it faces the eye; from behind, it stays inside or outside the mesh.
-        if normal.dot(direction) > 0.0 if upright.dot(direction) < 0.0 else upright.dot(outward) < 0.0:
+        if is_turned:
             normal.negate()
         turn = upright.rotation_difference(normal) @ self._matrix.to_quaternion()
         self._set(context, Matrix.LocRotScale(list(hit[0]), turn, self._matrix.to_scale()))

@@ -554,11 +554,10 @@ def test_a_probe_finds_the_place_that_a_map_touched(empty, vase, extension):
     for place in [painted.matrix_world @ Vector(place) for place in places]:
         _, foot, *_ = vase.closest_point_on_mesh(vase.matrix_world.inverted() @ place)
         assert (vase.matrix_world @ foot - place).length < 1e-5
-        assert np.allclose(touched_near(painted, place + Vector((0.02, 0.0, 0.0))), place)
-    assert touched_near(painted, (50.0, 0.0, 0.0)) == (50.0, 0.0, 0.0)
-    painted.hide_viewport = True
-    empty.context.view_layer.update()
-    assert touched_near(painted, (3.0, 1.0, 0.0)) == (3.0, 1.0, 0.0)  # Its colors are not seen.
+        assert np.allclose(touched_near(painted, vase, place + Vector((0.02, 0.0, 0.0))), place)
+    assert touched_near(painted, vase, (50.0, 0.0, 0.0)) == (50.0, 0.0, 0.0)
+    painted.hide_set(True)
+    assert touched_near(painted, vase, (3.0, 1.0, 0.0)) == (3.0, 1.0, 0.0)  # Its colors are not seen.
 
 
 def test_a_probe_finds_the_place_whose_color_a_face_has(empty, extension):
@@ -574,10 +573,30 @@ def test_a_probe_finds_the_place_whose_color_a_face_has(empty, extension):
         shown = places[touch[face.loop_start]]
         for corner in face.vertices:
             at = 0.1 * face.center + 0.9 * ball.data.vertices[corner].co
-            assert np.allclose(touched_near(painted, at), shown, atol=1e-6)
+            assert np.allclose(touched_near(painted, ball, at), shown, atol=1e-6)
             others += np.linalg.norm(places - at, axis=1).min() < np.linalg.norm(shown - at) - 1e-3
     assert others > 10
-    assert touched_near(ball, (0.0, 0.0, 1.0)) == (0.0, 0.0, 1.0)  # It is no map.
+    top = (0.0, 0.0, 1.0)
+    assert touched_near(ball, ball, top) == top  # It is no map.
+    painted["tactile_places"] = painted["tactile_places"][:0]
+    assert touched_near(painted, ball, top) == top
+    ball.modifiers.new("Subdivision", "SUBSURF")
+    assert touched_near(painted, ball, top) == top  # It has other faces than the map.
+
+
+def test_in_a_hollow_a_click_takes_the_place_of_its_own_face(empty, extension):
+    """The map is drawn above the mesh, so that there the nearest of its faces may be another one."""
+    empty.ops.mesh.primitive_monkey_add()
+    monkey = empty.context.object
+    painted, _ = stability_map(empty)
+    touched_near = extension.tactile_addon.stability_map.map_object.touched_near
+    places, touch = np.reshape(painted["tactile_places"], (-1, 3)), values(painted.data, "touch").astype(int)
+    for face in monkey.data.polygons:
+        for corner in face.vertices:
+            at = 0.1 * face.center + 0.9 * monkey.data.vertices[corner].co
+            if monkey.closest_point_on_mesh(at)[3] == face.index:  # Not of a face that is bent.
+                shown = places[touch[face.loop_start]]
+                assert np.allclose(touched_near(painted, monkey, at), shown, atol=1e-5)
 
 
 def test_wide_faces_have_the_values_of_their_own_touches_and_not_of_narrow_ones_beside(empty):
