@@ -25,7 +25,7 @@ from .touching import FIRST_EXTENT, NEAR, SIZE
 ROUNDS, AT_ONCE = 3, 4  # The rounds, and the touches of each, at places that none before covers.
 LATER = 8  # The last patches, this number of them, are as large as those to come,
 OVERLAP = 3.0  # which overlap, so that they have this many times the area that is left.
-INSIDE = 1e-4  # Rays across walls begin this share of the size below the surface.
+INSIDE = 1e-5  # Rays across walls begin this share of the size below the surface.
 FACING = 0.5  # A patch covers walls that face as it does, by this cosine or more.
 
 
@@ -48,8 +48,7 @@ def expected_touches(
 
     Raises ValueError for bad arguments, and if a patch is felt at none of the places that are touched.
     """
-    p, up = (finite_array(*given, (None, 3), LARGEST) for given in (("points", points), ("outward", outward)))
-    up = np.array([unit_vector("outward", direction) for direction in up])
+    p, up = _places(points, outward)
     number("area", area, above=0.0)
     options = ExplorationOptions(
         farthest=FIRST_EXTENT * tolerance, largest_std=SIZE * tolerance, noise=noise, rng=generator_of(rng)
@@ -84,9 +83,8 @@ def thinnest_wall(surface: Surface, points: ArrayLike, outward: ArrayLike, size:
 
     Raises ValueError for bad arguments. A wall's sides face opposite ways, as for `Samples.thickness`.
     """
-    p, up = (finite_array(*given, (None, 3), LARGEST) for given in (("points", points), ("outward", outward)))
-    size = number("size", size, above=0.0)
-    inward = -np.array([unit_vector("outward", direction) for direction in up])
+    p, up = _places(points, outward)
+    size, inward = number("size", size, above=0.0), -up
     starts = p + INSIDE * size * inward  # It is off the surface, which the ray would meet.
     hits = [surface.ray_cast(vector_of(a), vector_of(b), size) for a, b in zip(starts, inward, strict=True)]
     thickness = [
@@ -94,6 +92,15 @@ def thinnest_wall(surface: Surface, points: ArrayLike, outward: ArrayLike, size:
         for hit, point, way in zip(hits, p, inward, strict=True)
     ]
     return sorted(thickness)[int(THIN_SHARE * len(p))]
+
+
+def _places(points: ArrayLike, outward: ArrayLike) -> tuple[Array, Array]:
+    """Points and unit outward directions, (n, 3) each. Raises ValueError for bad ones and for none."""
+    p = finite_array("points", points, (None, 3), LARGEST)
+    up = finite_array("outward", outward, p.shape, LARGEST)
+    if not len(p):
+        raise ValueError("points: expected one or more, got none")
+    return p, np.array([unit_vector("outward", direction) for direction in up])
 
 
 def _rim(surface: Surface, e: Exploration, outward: Array, tolerance: float) -> Array:

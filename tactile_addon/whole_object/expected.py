@@ -20,7 +20,9 @@ PLACES, SEED = 600, 0  # A few of so many random places are touched for the esti
 # The time of a touch with its part of joining, and that of a mesh, as multiples of the time of a touch that
 # is tried: python -m benchmarks.add_menu.
 JOINING, MESHING = 3.3, 60.0
-THIN = 16.0  # Walls thinner than the size by more than this factor have shorter edges, a quarter of a wall.
+# Edges are a quarter of a wall that is thinner than the size by the first factor or more. Walls that are
+# thinner by the second one have no shorter edges.
+THIN, THINNEST = 16.0, 133.0
 
 
 class Expected:
@@ -60,8 +62,13 @@ def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, f
     begin = perf_counter()
     touches, tried = core.expected_touches(mesh, *places, area, tolerance=tolerance, noise=noise, rng=SEED)
     each = (perf_counter() - begin) / tried
-    meshing = MESHING * max(1.0, mesh.size / (THIN * core.thinnest_wall(mesh, *places, mesh.size))) ** 2
+    meshing = MESHING * fineness(core.thinnest_wall(mesh, *places, mesh.size) / mesh.size)
     return _rounded(touches), (meshing + JOINING * touches) * each
+
+
+def fineness(wall: float) -> float:
+    """How many times as many triangles a surface has if its thinnest wall has this share of the size."""
+    return float(np.clip(1.0 / wall, THIN, THINNEST) / THIN) ** 2
 
 
 def _rounded(number: float) -> int:

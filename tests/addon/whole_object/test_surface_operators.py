@@ -160,3 +160,12 @@ def test_a_dialog_can_tell_how_many_touches_there_will_be(extension, empty, ball
     record = made(empty.ops.tactile.touch_all_over, "tactile_object", tolerance=0.02)[1]
     assert 0.5 < count / record["touches"] < 2.0
     assert expected.words(ball, empty.context, 0.005, "normal", 0.0) != words
+
+
+def test_the_mesh_of_thin_walls_is_fine(extension):
+    """Each halving of a wall halves edges, until the grid is as fine as it may be."""
+    fineness = extension.tactile_addon.whole_object.expected.fineness
+    assert fineness(np.inf) == fineness(1.0) == fineness(1.0 / 16.0) == 1.0
+    assert fineness(1.0 / 32.0) == pytest.approx(4.0)
+    assert fineness(1.0 / 64.0) == pytest.approx(16.0)
+    assert fineness(1e-3) == fineness(1e-5) < 80.0

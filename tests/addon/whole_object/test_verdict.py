@@ -56,6 +56,9 @@ def test_a_cube_is_a_cube_with_sharp_edges(empty, extension):
     assert report.object_verdict(record) == f"Good. {OK} {agreement} {rule}"
     assert report.is_all_within(record)
     assert dict(report.object_rows(record))["Off the Mesh"] == "0 cm"
+    # What is farther off than that is in the message already.
+    far = {**record, "deviation_max": 0.05, "within": 0.9}
+    assert report.agreement(far) == f"90 % of the surface is within the tolerance of 0.4 cm. {rule}"
     mesh = surface.data
     ends = np.array([edge.vertices for edge in mesh.edges])[values(mesh, "sharp_edge").astype(bool)]
     at_faces = np.isclose(np.abs(positions(mesh)), 1.0, atol=1e-5).sum(axis=1)
@@ -285,6 +288,7 @@ def progress_of(touches, core):
             left = left[~core.covered_by(r, rim, left, touches.tolerance)]
         count = len(touches.found)
         steps.append((touches.words.split()[0], touches.share, 1.0 - len(left) / 1000))
+        assert "goes on at 0" not in touches.words
     words, shares, felt = zip(*steps, strict=True)
     touching = words.index("Meshing")
     assert (np.array(shares[:touching]) <= 0.8 * np.array(felt[:touching]) + 1e-9).all()

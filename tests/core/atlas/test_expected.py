@@ -76,6 +76,29 @@ def test_walls_are_as_thick_as_from_side_to_side():
     assert core.thinnest_wall(plate, points[narrow], normals[narrow], 0.9) == np.inf
     with pytest.raises(ValueError, match="size: expected a finite number above 0, got 0"):
         core.thinnest_wall(plate, points, normals, 0.0)
+    with pytest.raises(ValueError, match=r"outward: expected shape \(1000, 3\), got \(999, 3\)"):
+        core.thinnest_wall(plate, points, normals[1:], 1.0)
+    with pytest.raises(ValueError, match="points: expected one or more, got none"):
+        core.thinnest_wall(plate, points[:0], normals[:0], 1.0)
+
+
+def test_very_few_places_do_not_make_a_wall_thin():
+    """As beside an edge, where rays meet the next wall."""
+
+    class Stairs:
+        """Two sheets that are .1 apart where x is below a place, and 1 apart elsewhere."""
+
+        def __init__(self, step):
+            self.step = step
+
+        def ray_cast(self, origin, direction, distance):
+            gap = 0.1 if origin[0] < self.step else 1.0
+            return np.add(origin, (0.0, 0.0, -gap - origin[2])), np.array([0.0, 0.0, -1.0])
+
+    x = np.linspace(0.0, 1.0, 1000, endpoint=False)
+    points, up = np.column_stack([x, 0.0 * x, 0.0 * x]), np.tile([0.0, 0.0, 1.0], (1000, 1))
+    assert core.thinnest_wall(Stairs(0.002), points, up, 2.0) == pytest.approx(1.0)
+    assert core.thinnest_wall(Stairs(0.01), points, up, 2.0) == pytest.approx(0.1)
 
 
 def test_a_wedge_has_no_thickness():

@@ -11,6 +11,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 import core
+from tests.surfaces import Exact
 
 UP = (0.0, 0.0, 1.0)
 
@@ -260,6 +261,39 @@ def test_facets_that_are_long_across_a_smooth_bend_are_felt(ball):
         wrong += r.status == "ok" and off > 0.25 and not few
     assert called
     assert wrong == 0
+
+
+class Bump:
+    """The height -x^2 - y^2 at the corners of a grid of squares, and that of its rim beyond a radius."""
+
+    def __init__(self, width, radius):
+        self.width, self.radius = width, radius
+
+    def face_near(self, point):
+        row, column = np.floor(np.divide(point[:2], self.width) + 0.5).astype(int).tolist()
+        return 1000 * row + column + 500
+
+    def corners_of(self, face):
+        row, column = divmod(face, 1000)
+        column -= 500
+        x, y = self.width * np.array([(row - 0.5, column - 0.5)] * 4).T
+        x, y = x + self.width * np.array([0, 1, 1, 0]), y + self.width * np.array([0, 0, 1, 1])
+        return np.column_stack([x, y, -np.minimum(x**2 + y**2, self.radius**2)])
+
+
+@pytest.mark.parametrize(("radius", "few"), [(10.0, False), (0.34, True)])
+def test_corners_nearby_count_only_where_those_farther_away_have_the_same_curvatures(radius, few):
+    """Of a bump that is as wide as three facets neither says what the shape is."""
+    bump = Bump(0.2, radius)
+    bowl = Exact(
+        lambda x, y, z: z + x**2 + y**2,
+        lambda p: np.array([2.0 * p[0], 2.0 * p[1], 1.0]),
+        np.zeros(3),
+        -2.0,
+        -2.0,
+    )
+    r = core.explore(bowl, bowl.point, UP, extent=0.3).result
+    assert core.has_few_facets(r, bump.face_near, bump.corners_of) is few
 
 
 def spheroid_curvatures(point, height):
