@@ -17,12 +17,10 @@ from ..reconstruction.result import Reconstruction
 # benchmarks.facets shows how far curvatures are off with these.
 OTHER = 0.2  # Curvatures are those of a facet if they are off by this share of the larger one of the shape.
 # That is by how facets turn within the first number of widths, or by corners of facets within the second one
-# if those within the third one have the same curvatures. No facet is where the patch turns by more than BEND.
+# if those within the third one have the same curvatures; all where the patch turns by BEND or less.
 TURNING, NEAR, FAR = 2.0, 0.6, 1.3
 BEND = math.radians(40.0)
-TURNS = np.radians(
-    [0.0, 20.0, 40.0]
-)  # Facets are below the curves, and below these turned around the normal.
+TURNS = np.radians([0.0, 20.0, 40.0])  # The curves, turned by these around the normal, show where facets are.
 # Edges between these angles stand for a smooth bend,
 DISTINCT_COSINE, SMOOTH_COSINE = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))
 # if both facets have this share of the wider one's width across it, and of the radius; else one is a fillet.
