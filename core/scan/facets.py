@@ -69,12 +69,15 @@ def has_few_facets(
         if not (width and _are_few(map(shape, felt))):
             return False
         radius *= 0.5
-    if not _is_smooth(here, max(width, radius), facet_near):
+    if any(_bends(here, facet_near)) and not _is_smooth(here, 0.0, facet_near):
+        return False  # Its bends are those of fillets.
+    points, wide = _around(r, TURNING * width), max(width, radius)
+    faces = [face_near(point) for point in points]
+    if not any(_is_smooth(facet, wide, facet_near) for facet in map(shape, set(faces))):
         return False
     if len(felt) == 1:
         return True
-    points = _around(r, TURNING * width)
-    turning = _turning(r, points, [facet_near(point) for point in points])
+    turning = _turning(r, points, [shape(face) for face in faces])
     near, far = (
         _of_corners(r, map(shape, set(map(face_near, _around(r, share * width))))) for share in (NEAR, FAR)
     )
