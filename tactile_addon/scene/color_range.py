@@ -59,8 +59,8 @@ def _record(obj: Object) -> Any:
 def range_field(obj: Object) -> tuple[str, str]:
     """The property to draw for the range, and the factor in its label: a field has some seven digits."""
     if obj.tactile_range < LEAST_DRAWN:
-        return "tactile_small_range", f"{SMALL:g}"
-    return ("tactile_large_range", f"{LARGE:g}") if obj.tactile_range > MOST_DRAWN else ("tactile_range", "")
+        return "tactile_small_range", "1e-6"
+    return ("tactile_large_range", "1e6") if obj.tactile_range > MOST_DRAWN else ("tactile_range", "")
 
 
 def _get(obj: Object) -> float:

@@ -255,8 +255,7 @@ def _draw_range(context: bpy.types.Context, layout: bpy.types.UILayout, patch: O
     row.use_property_split = False
     power, unit = unit_of_range(patch, context.scene)
     shown, factor = range_field(patch)
-    # A factor leaves no room for more.
-    name = iface("Range" if factor or patch_record.RANGE in patch else "Range (Auto)")
+    name = iface("Range" if patch_record.RANGE in patch else "Range (Auto)")
     symbol = units.symbol(power, unit)
     if factor:
         symbol = f"{factor}{symbol[1:]}" if symbol.startswith("1/") else f"{factor} {symbol}"

@@ -65,7 +65,7 @@ def test_patches_share_a_range_and_may_be_given_one(empty, ball, extension):
     assert patches[0].tactile_range == pytest.approx(2e-6, rel=1e-6)
     assert extension.tactile_addon.scene.color_range.range_field(patches[0]) == (
         "tactile_small_range",
-        "1e-06",
+        "1e-6",
     )
     assert patches[0].tactile_small_range == pytest.approx(2.0, rel=1e-6)  # A field has six decimals.
     patches[0].tactile_small_range = 4.0
@@ -73,7 +73,7 @@ def test_patches_share_a_range_and_may_be_given_one(empty, ball, extension):
     patches[0].tactile_range = 4e6
     assert extension.tactile_addon.scene.color_range.range_field(patches[0]) == (
         "tactile_large_range",
-        "1e+06",
+        "1e6",
     )
     assert patches[0].tactile_large_range == pytest.approx(4.0, rel=1e-6)
     patches[0].tactile_range = 0.0
