@@ -24,6 +24,7 @@ from statistics import median
 
 import numpy as np
 
+from tests.surfaces import ellipsoid
 from tools import blender
 
 from . import SCANS_FOLDER, machine, table
@@ -32,11 +33,8 @@ from .scans import sampling_planes
 POINTS = 60
 TOP = 0.9999  # The lids of cylinders and cones, which are flat, are beyond this height; they are left out.
 BINS = (1, 2, 4, 6, 8, 10, 12, 16, 24, 40, math.inf)  # Each goes up to the next.
-WRONG, RIGHT = (
-    0.25,
-    0.15,
-)  # A good patch with a larger error than this is wrong, and a facet's with a smaller one.
-FINEST, AGREE = 5, 0.15  # Suzanne's curvatures are those of so many levels where two extents agree to this.
+WRONG, RIGHT = 0.25, 0.15  # Good patches with larger errors are wrong, those of facets with smaller ones.
+FINEST, AGREE = 5, 0.15  # Suzanne's curvatures are those of these levels where two extents agree to this.
 SCANS = {
     "pear": "pear.ply",
     "lemon": "lemon.ply",
@@ -77,7 +75,7 @@ def shapes(add):
 
 
 def scaled_balls(bpy):
-    """The same of balls that are scaled along their axis."""
+    """(kind, adds the shape, the principal curvatures at a point of it) for balls scaled along their axis."""
 
     def add(segments, height):
         bpy.ops.mesh.primitive_uv_sphere_add(segments=segments, ring_count=segments // 2)
@@ -85,10 +83,9 @@ def scaled_balls(bpy):
         bpy.ops.object.transform_apply(scale=True)
 
     def exact(p, height):
-        """Of the spheroid (cos t, height sin t) about its axis."""
-        sine = p[2] / height / math.hypot(p[0], p[1], p[2] / height)
-        wide = math.sqrt(sine**2 + height**2 * (1.0 - sine**2))
-        return -height / wide**3, -height / wide
+        """The principal curvatures below or above a point of a facet."""
+        ball = ellipsoid(1.0, 1.0, height, v=math.atan2(p[2] / height, math.hypot(p[0], p[1])))
+        return ball.k1, ball.k2
 
     for segments in (32, 64):
         for height in (0.15, 0.3, 0.5, 2.0):
@@ -106,7 +103,10 @@ def suzanne(bpy, levels):
 
 
 def objects(bpy, add_on, touch):
-    """(name, object, extent, a function) of all; that has the curvatures at a place of a touch, or None."""
+    """(name, object, extent, a function of a place and a touch there) of all objects.
+
+    The function has the principal curvatures of the shape, or None where these are not known.
+    """
     for name, add, exact in (*shapes(bpy.ops.mesh), *scaled_balls(bpy)):
         bpy.ops.wm.read_homefile(use_empty=True)
         add()

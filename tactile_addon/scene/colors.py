@@ -32,7 +32,7 @@ def symmetric_range(values: Array, floor: float) -> float:
 
 
 def range_by_area(values: Array, areas: Array, floor: float) -> float:
-    """The same range where values (n,) stand for areas (n,) of unequal size."""
+    """The r of a scale -r..r that holds for 98 % of an area, by values (n,) of its parts with areas (n,)."""
     sizes = np.abs(values)
     order = np.argsort(sizes)
     areas = np.cumsum(areas[order])

@@ -16,7 +16,7 @@ from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Object
 from .object_touches import tolerance_of
 
-PLACES, SEED = 600, 0  # A few of so many random places are touched for the estimate.
+PLACES, SEED = 600, 0  # A few of these random places are touched for the estimate.
 # The time of a touch with its part of joining, and that of a mesh, as multiples of the time of a touch that
 # is tried: python -m benchmarks.add_menu.
 JOINING, MESHING = 3.3, 60.0

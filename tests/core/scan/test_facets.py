@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 import core
-from tests.surfaces import Exact
+from tests.surfaces import Exact, ellipsoid
 
 UP = (0.0, 0.0, 1.0)
 
@@ -283,7 +283,7 @@ class Bump:
 
 @pytest.mark.parametrize(("radius", "few"), [(10.0, False), (0.34, True)])
 def test_corners_nearby_count_only_where_those_farther_away_have_the_same_curvatures(radius, few):
-    """Of a bump that is as wide as three facets neither says what the shape is."""
+    """A bump that is as wide as three facets does not show what the shape is."""
     bump = Bump(0.2, radius)
     bowl = Exact(
         lambda x, y, z: z + x**2 + y**2,
@@ -296,13 +296,6 @@ def test_corners_nearby_count_only_where_those_farther_away_have_the_same_curvat
     assert core.has_few_facets(r, bump.face_near, bump.corners_of) is few
 
 
-def spheroid_curvatures(point, height):
-    """The principal curvatures (2,), in order, of a ball that is scaled along its axis."""
-    sine = point[2] / height / math.hypot(point[0], point[1], point[2] / height)
-    wide = math.sqrt(sine**2 + height**2 * (1.0 - sine**2))
-    return np.sort([-height / wide**3, -height / wide])
-
-
 def test_curvatures_of_flattened_balls_are_seldom_wrongly_said_to_be_those_of_facets():
     """They change within a facet or two, which corners of facets show and their normals do not."""
     rng, called, wrongly, wrong = np.random.default_rng(0), 0, 0, 0
@@ -313,7 +306,9 @@ def test_curvatures_of_flattened_balls_are_seldom_wrongly_said_to_be_those_of_fa
             above = across * math.cos(turn), across * math.sin(turn), 2.0
             point, normal = ball.ray_cast(above, (0.0, 0.0, -1.0), 4.0)
             r = core.explore(ball, point, normal).result
-            exact = spheroid_curvatures(point, height)
+            v = math.atan2(point[2] / height, math.hypot(*point[:2]))
+            shape = ellipsoid(1.0, 1.0, height, v=v)
+            exact = np.sort([shape.k1, shape.k2])
             off = np.abs(np.sort([r.k1, r.k2]) - exact).max() / -exact[0]
             few = core.has_few_facets(r, ball.face_near, ball.corners_of)
             called += few
