@@ -42,6 +42,7 @@ class Observations(NamedTuple):
         (b, 0, 3) without
     tangent : (b, 3), which d1 is to follow
     noise : (b,), standard deviation of a contact, at least; noise_is_known : (b,), whether it is no more
+    point_std : (b,), standard deviation of the height at the origin, before contacts are known
     """
 
     contacts: Array
@@ -49,6 +50,7 @@ class Observations(NamedTuple):
     tangent: Array
     noise: Array
     noise_is_known: NDArray[np.bool_]
+    point_std: Array
 
     def at(self, which: NDArray[np.bool_]) -> "Observations":
         """Those of some of the touches."""
@@ -67,13 +69,12 @@ class _State(NamedTuple):
 
 
 def joint_fit(
-    given: Observations, weights: Array, k1: Array, k2: Array, through: bool = True
+    given: Observations, weights: Array, k1: Array, k2: Array
 ) -> tuple[Array, SurfacePosterior, Array]:
     """The Darboux frames and the polynomials that the contacts of b touches show, and how well they do.
 
     weights : (b, n), 1 for a contact, 0 where there is none
     k1, k2 : (b,), a first guess of the curvatures along the given axes
-    through : whether the surfaces pass through the origin; if not, their height there is free
 
     Returns the columns d1, d2, n (b, 3, 3) in the frame given, the posteriors in the new one, where
     the means of the slopes and of the mixed second derivative are 0, and the weights (b, n) that the
@@ -83,19 +84,17 @@ def joint_fit(
     floor = np.maximum(given.noise, MISFIT)
     usual = prior_variances(np.full(len(k1), USUAL_WAVINESS))
     state = _State(_first_axes(given.contacts, weights, k1, k2), k1, k2, weights, usual, floor)
-    return _passes(given._replace(noise=floor), state, 0, through)
+    return _passes(given._replace(noise=floor), state, 0)
 
 
-def _passes(
-    given: Observations, state: _State, step: int, through: bool
-) -> tuple[Array, SurfacePosterior, Array]:
+def _passes(given: Observations, state: _State, step: int) -> tuple[Array, SurfacePosterior, Array]:
     """What `joint_fit` gives, from a pass on."""
-    state, settled, surface = _pass(given, state, step, through)
+    state, settled, surface = _pass(given, state, step)
     if surface is None:
-        return _passes(given, state, step + 1, through)
+        return _passes(given, state, step + 1)
     found, left = (state.axes, surface, state.weights), ~settled
     if left.any():
-        rest = _passes(given.at(left), _State(*(v[left] for v in state)), step + 1, through)
+        rest = _passes(given.at(left), _State(*(v[left] for v in state)), step + 1)
         arrays = ((axes, of.mean, of.root, of.noise, of.visibility, w) for axes, of, w in (found, rest))
         for whole, part in zip(*arrays, strict=True):
             whole[left] = part
@@ -120,12 +119,12 @@ def _first_axes(contacts: Array, weights: Array, k1: Array, k2: Array) -> Array:
 
 
 def _pass(
-    given: Observations, state: _State, step: int, through: bool
+    given: Observations, state: _State, step: int
 ) -> tuple[_State, NDArray[np.bool_], SurfacePosterior | None]:
     """One fit in the axes and with the weights so far: a mask of settled touches; posteriors if any is."""
     expected = prior_mean(state.k1, state.k2)
     local, normals = given.contacts @ state.axes, given.normals @ state.axes
-    data = sextics(local, state.weights, expected, normals, through)
+    data = sextics(local, state.weights, expected, normals, given.point_std / given.noise)
     hyper = _hyperparameters(state, data, given.noise, step)
     found = mean_given(data, hyper)
     if normals.size:
@@ -163,13 +162,19 @@ def _hyperparameters(state: _State, data: Sextics, floor: Array, step: int) -> H
     return Hyperparameters(prior, noise)
 
 
-def posterior_of(k1: float, k2: float, contacts: Array, noise: float) -> SurfacePosterior:
+def posterior_of(k1: float, k2: float, contacts: Array, noise: float, point_std: float) -> SurfacePosterior:
     """The posterior of contacts (n, 3) in a given frame with curvatures k1 and k2, all in unit radius."""
-    return posteriors_of(k1, k2, contacts, np.ones((1, len(contacts))), noise).at(0)
+    return posteriors_of(k1, k2, contacts, np.ones((1, len(contacts))), noise, point_std).at(0)
 
 
 def posteriors_of(
-    k1: float, k2: float, contacts: Array, weights: Array, noise: float, by_evidence: bool = True
+    k1: float,
+    k2: float,
+    contacts: Array,
+    weights: Array,
+    noise: float,
+    point_std: float,
+    by_evidence: bool = True,
 ) -> SurfacePosterior:
     """What `posterior_of` gives for b different weights (b, n) of the contacts.
 
@@ -178,8 +183,8 @@ def posteriors_of(
     """
     b = len(weights)
     expected, local = prior_mean(np.full(b, k1), np.full(b, k2)), contacts[None].repeat(b, axis=0)
-    data = sextics(local, weights, expected, local[:, :0])
     floor, usual = np.full(b, max(noise, MISFIT)), prior_variances(np.full(b, USUAL_WAVINESS))
+    data = sextics(local, weights, expected, local[:, :0], point_std / floor)
     hyper = data.hyperparameters(floor) if by_evidence else Hyperparameters(usual, floor)
     return posterior_given(expected + mean_given(data, hyper), data, hyper)
 

@@ -19,13 +19,13 @@ NOTICED = 4.0  # Waviness and noise of the others are found where this many devi
 
 
 def contradicting_curve(
-    contacts: Array, curve: NDArray[np.intp], posterior: SurfacePosterior, noise: float
+    contacts: Array, curve: NDArray[np.intp], posterior: SurfacePosterior, noise: float, point_std: float
 ) -> tuple[float, float]:
     """The number of deviations, and the height in unit radius, by which a curve is off what the others show.
 
     contacts : (n, 3), besides the reference point, in the frame and in unit radius
     curve : (n,), the number of the curve of each contact, -1 for contacts of strokes
-    posterior : of all contacts; noise : least deviation of a contact
+    posterior : of all contacts; noise : least deviation of a contact; point_std : as in `Observations`
 
     Both are medians over the outer contacts of the curve that is off by most deviations, so outliers do not
     count. They are 0 if there are too few curves to judge.
@@ -35,11 +35,11 @@ def contradicting_curve(
         return 0.0, 0.0
     others = (curve != numbers[numbers >= 0][:, None]).astype(float)
     k1, k2 = (2.0 * float(posterior.polynomial[i]) for i in (2, 4))  # The terms x^2 and y^2.
-    usual = posteriors_of(k1, k2, contacts, others, float(posterior.noise), by_evidence=False)
+    usual = posteriors_of(k1, k2, contacts, others, float(posterior.noise), point_std, by_evidence=False)
     found = _most_off(contacts, others, usual)
     if found[0] <= NOTICED:
         return found
-    return _most_off(contacts, others, posteriors_of(k1, k2, contacts, others, noise))
+    return _most_off(contacts, others, posteriors_of(k1, k2, contacts, others, noise, point_std))
 
 
 def _most_off(contacts: Array, others: Array, posteriors: SurfacePosterior) -> tuple[float, float]:

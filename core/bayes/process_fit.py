@@ -66,14 +66,14 @@ def touch_of(contacts: Array, roots: Array, normals: Array, places: NDArray[np.i
 
 
 def process_fit(
-    given: Observations, weights: Array, posterior: SurfacePosterior, ranks: NDArray[np.intp], through: bool
+    given: Observations, weights: Array, posterior: SurfacePosterior, ranks: NDArray[np.intp], offsets: Array
 ) -> tuple[Array, Array, list[SurfacePosterior]]:
     """The fits of b touches, with a process where the evidence favors one, and unchanged elsewhere.
 
     given : in the Darboux frames of the sextics, whose posteriors are a stack
     weights : (b, n), 0 where there is no contact
     ranks : (b, n), of the contacts on each half of a curve, from the rim, and of those of strokes
-    through : whether the origin was touched
+    offsets : (b,), the height of the reference point above the origin
 
     Returns the columns d1, d2, n (b, 3, 3) in the frame given, the new radii (b,) in its unit, and the
     posteriors in the new frames and units.
@@ -84,10 +84,13 @@ def process_fit(
     rms = np.sqrt((weights * off**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0))
     for i in np.flatnonzero(rms > UNEXPLAINED_MISFIT * least):
         # The point is a contact like the others: on facets its residual may be as large.
-        there, point = np.flatnonzero(weights[i]), np.zeros((int(through), 3))
-        normals = given.normals[i] if not given.normals.size else np.vstack([given.normals[i][there], point])
-        roots = np.sqrt(np.append(weights[i, there], np.ones(len(point))))
-        rank, n = np.append(ranks[i, there], np.zeros(len(point), dtype=np.intp)), len(roots)
+        there, point = np.flatnonzero(weights[i]), np.array([[0.0, 0.0, offsets[i]]])
+        normals = (
+            given.normals[i] if not given.normals.size else np.vstack([given.normals[i][there], 0.0 * point])
+        )
+        weight = (least[i] / max(least[i], given.point_std[i])) ** 2
+        roots = np.sqrt(np.append(weights[i, there], weight))
+        rank, n = np.append(ranks[i, there], 0), len(roots)
         # Places are spread on each half of a curve, whichever way it runs and whichever curve is the first.
         places = np.flatnonzero(rank * min(n, MOST_PLACES) % n < MOST_PLACES)
         touch = touch_of(np.vstack([given.contacts[i, there], point]), roots, normals, places)

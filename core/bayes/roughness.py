@@ -31,7 +31,9 @@ def roughness(contacts: Array, noise: float) -> float:
     if radius == 0.0:
         return 0.0
     local /= radius
-    data = sextics(local[None], np.ones((1, len(local))), np.zeros((1, len(TERMS))), local[None, :0])
+    data = sextics(
+        local[None], np.ones((1, len(local))), np.zeros((1, len(TERMS))), local[None, :0], np.zeros(1)
+    )
     usual = prior_variances(np.array([USUAL_WAVINESS]))
     off = data.residuals(mean_given(data, Hyperparameters(usual, np.array([MISFIT]))))[0]
     variance = float(off @ off) / max(len(off) - EXPLAINED_TERMS, 1)

@@ -28,8 +28,8 @@ class Sextics(NamedTuple):
     weights : (b, n)
     heights, slopes : (b, 28, 28), normal equations [[gram, rhs], [rhs', y'y]] of contacts, and of measured
         normals in units of their deviations; the latter are 0 without normals
-    pivot : (b, 27), mean of the terms over the contacts, for surfaces that need not pass through the origin:
-        the rows are then less their means; 0 for surfaces that do
+    pivot : (b, 27), what the contacts' mean terms have of a share in the height at the origin
+    offset : (b,), the variance that this height keeps when the terms are known, over that of the noise
     """
 
     rows: Array
@@ -37,6 +37,7 @@ class Sextics(NamedTuple):
     heights: Array
     slopes: Array
     pivot: Array
+    offset: Array
 
     @property
     def counts(self) -> Array:
@@ -58,28 +59,42 @@ class Sextics(NamedTuple):
         return hyperparameters(self.heights[which], self.counts[which], self.slopes[which], floor[which])
 
 
-def sextics(local: Array, weights: Array, expected: Array, normals: Array, through: bool = True) -> Sextics:
+def sextics(local: Array, weights: Array, expected: Array, normals: Array, point_std: Array) -> Sextics:
     """The equations of contacts (b, n, 3) and their weights (b, n), less the prior's means (b, 27).
 
     normals : (b, n, 3), measured normals over their standard deviations, or (b, 0, 3)
-    through : whether the surfaces pass through the origin
+    point_std : (b,), standard deviation of the height at the origin before contacts are known, over that of
+        a contact
+
+    The height at the origin is one more coefficient, with the prior N(0, point_std^2), and is eliminated: if
+    m is the mean of all rows over contacts of the total weight W, it is f (m_28 - m_1..27' b), and known to
+    the variance f / W, with the f of `offset_share`.
     """
     b, n = weights.shape
-    rows, pivot = np.empty((b, len(TERMS) + 1, n)), np.zeros((b, len(TERMS)))
+    rows = np.empty((b, len(TERMS) + 1, n))
     rows[:, :-1] = monomials(local, TERMS).swapaxes(1, 2)
     np.subtract(local[..., 2], (expected[:, None] @ rows[:, :-1])[:, 0], out=rows[:, -1])
-    if not through:
-        means = np.einsum("bin,bn->bi", rows, weights / weights.sum(axis=1)[:, None])
-        rows -= means[..., None]
-        pivot = means[:, :-1]
     heights = (rows * weights[:, None]) @ rows.transpose(0, 2, 1)
+    pivot, offset = np.zeros((b, len(TERMS))), np.zeros(b)
+    if point_std.any():
+        total, share = weights.sum(axis=1), offset_share(weights, point_std)
+        means = np.einsum("bin,bn->bi", rows, weights) / total[:, None]
+        heights -= (share * total)[:, None, None] * means[:, :, None] * means[:, None]
+        rows -= (share[:, None] * means)[..., None]
+        pivot, offset = share[:, None] * means[:, :-1], share / total
     slopes = np.zeros_like(heights)
     if normals.size:
         partials, steepness = slope_equations(normals, local, weights)
         steepness = steepness[..., None] - partials @ expected[..., None]
         columns = np.concatenate([partials, steepness], axis=2)
         slopes = columns.transpose(0, 2, 1) @ columns
-    return Sextics(rows, weights, heights, slopes, pivot)
+    return Sextics(rows, weights, heights, slopes, pivot, offset)
+
+
+def offset_share(weights: Array, point_std: Array) -> Array:
+    """The share (b,) of the mean residual of contacts that is a height at the origin, of `sextics`."""
+    ratio = weights.sum(axis=1) * point_std**2
+    return ratio / (1.0 + ratio)
 
 
 def mean_given(data: Sextics, hyper: Hyperparameters) -> Array:
@@ -110,9 +125,8 @@ def posterior_given(mean: Array, data: Sextics, hyper: Hyperparameters) -> Surfa
     # Waviness and noise are estimates, so deviations are those of a Student t of this freedom.
     freedom = np.maximum(data.counts - FREE, LEAST_FREEDOM)
     root *= np.sqrt(freedom / (freedom - 2.0))[:, None, None]
-    if data.pivot.any():  # The mean height of the contacts is that of the surface at the pivot.
-        root[:, :-1, -1] = -(root[:, :-1, :-1] @ data.pivot[..., None])[..., 0]
-        root[:, -1, -1] = hyper.noise / np.sqrt(data.weights.sum(axis=1))
+    root[:, :-1, -1] = -(root[:, :-1, :-1] @ data.pivot[..., None])[..., 0]
+    root[:, -1, -1] = hyper.noise * np.sqrt(data.offset)
     return SurfacePosterior(mean, root, hyper.noise, visibility)
 
 

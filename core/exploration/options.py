@@ -74,7 +74,7 @@ class ExplorationOptions:
     @property
     def fit(self) -> FitOptions:
         """The options of the fit that is returned. The contours have their own noise."""
-        return FitOptions(self.method, self.degree, None, self.weight, self.solver)
+        return FitOptions(self.method, self.degree, None, None, self.weight, self.solver)
 
     @property
     def is_bayes(self) -> bool:

@@ -39,12 +39,13 @@ def reconstruct(
     method: str = "bayes",
     degree: int | str = "auto",
     noise: float | None = None,
+    point_std: float | None = None,
     weight: float | None = None,
     solver: str = "fast",
 ) -> Reconstruction:
     """The surface patch around `point` from three or more contours through it, from strokes, or from both.
 
-    point : (3,), exact; outward : (3,), on the outer side of the surface. If the contours are those of a
+    point : (3,); outward : (3,), on the outer side of the surface. If the contours are those of a
         ball's center, the patch is that of the contacts, and the point is a center or, if no center is
         nearer to it than half the ball's radius, a contact
     strokes : curves that do not pass through the point, (n, 3) each or Contours, in the order in which their
@@ -57,6 +58,9 @@ def reconstruct(
         "least-squares" (5)
     degree : d of (1), 2 to 6, or "auto", the lowest that describes what the contacts show
     noise : noise floor, the standard deviation that a contact has at least; None for the contours' own
+    point_std : standard deviation of the point along the normal, a length: 0 if it is exact. If it is None,
+        a point that is a contact of every curve has their noise, and any other is only a place: "bayes" has
+        the origin where contacts show the surface below it
     weight : lambda L^2 of "tagc" and "quadratic-variation", None for 1000 and 1e5
     solver : for "tagc", "fast" (Newton, from the quadric) or "descent" (the paper's, from its start)
 
@@ -70,7 +74,7 @@ def reconstruct(
     (-1.0, -1.0, 'ok')
     """
     p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
-    options = FitOptions(method, degree, noise, weight, solver, radius)
+    options = FitOptions(method, degree, noise, point_std, weight, solver, radius)
     p, touch = _touch(p, list_of("contours", contours, Contour), strokes, up, options)
     return _fitted_one(p, touch, up, options)
 

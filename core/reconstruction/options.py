@@ -21,6 +21,7 @@ class FitOptions:
     noise : the standard deviation that a contact has at least, a length; None for the contours' own
     weight : lambda L^2 of "tagc" and "quadratic-variation"; None for 1000 and 1e5
     solver : one of SOLVERS
+    point_std : the standard deviation of the point along the normal, a length; None to find it
     radius : without contours, contacts count up to this distance from the point; None for all
 
     Raises ValueError for bad ones.
@@ -29,6 +30,7 @@ class FitOptions:
     method: str = "bayes"
     degree: int | str = "auto"
     noise: float | None = None
+    point_std: float | None = None
     weight: float | None = None
     solver: str = "fast"
     radius: float | None = None
@@ -44,6 +46,7 @@ class FitOptions:
         vars(self).update(  # __setattr__ of a frozen dataclass raises.
             degree=degree if isinstance(degree, str) else int(degree),
             noise=None if self.noise is None else number("noise", self.noise, least=0.0),
+            point_std=None if self.point_std is None else number("point_std", self.point_std, least=0.0),
             weight=None if weight is None else number("weight", weight, above=0.0),
             radius=None if self.radius is None else number("radius", self.radius, above=0.0),
         )

@@ -46,6 +46,8 @@ class Reconstruction:
     strokes : the other fitted contacts, in the world, (n, 3); means of neighbors if there are many
     noise : noise floor, the standard deviation that a contact has at least, in units of L
     method : the method of the fit
+    point : (3,), the reference point, if it was touched or given with a deviation; None where contacts show it
+    point_std : its standard deviation along the normal, in units of L; 1 where contacts show it
     converged : whether its solver converged
     taps : what was felt between the curves; None if nobody tapped there
     known_height_std : mean_height_std, if it is known already
@@ -60,6 +62,8 @@ class Reconstruction:
     contours: tuple[Contour, ...]
     noise: float
     method: str
+    point: Array | None = None
+    point_std: float = 0.0
     converged: bool = True
     strokes: Array = field(default_factory=lambda: np.empty((0, 3)))
     taps: Taps | None = None
@@ -68,7 +72,8 @@ class Reconstruction:
 
     def __post_init__(self) -> None:
         copies = tuple(contour.copied() for contour in self.contours)
-        vars(self).update(contours=copies, strokes=read_only(self.strokes))
+        point = None if self.point is None else read_only(self.point)
+        vars(self).update(contours=copies, strokes=read_only(self.strokes), point=point)
 
     def __repr__(self) -> str:
         point = ", ".join(f"{x:.4g}" for x in self.frame.origin)
@@ -100,14 +105,24 @@ class Reconstruction:
     @cached_property
     def contacts(self) -> Array:
         """The fitted contacts besides the reference point, (n, 3), in the frame."""
-        curves = (contour.points - self.frame.origin for contour in self.contours)
-        off_point = [r[distances_from_point(r)[1]] for r in curves]
-        return np.vstack([*off_point, self.strokes - self.frame.origin]) @ self.frame.axes
+        each = zip(self.contours, self._off_point, strict=True)
+        points = np.vstack([*(contour.points[off] for contour, off in each), self.strokes])
+        return self.frame.to_local(points)
+
+    @property
+    def _off_point(self) -> list[NDArray[np.bool_]]:
+        """Which contacts of each contour are not the reference point."""
+        return [distances_from_point(contour.points - self._meeting)[1] for contour in self.contours]
+
+    @property
+    def _meeting(self) -> Array:
+        """The place (3,) where curves meet: the reference point or, where contacts show it, the origin."""
+        return self.frame.origin if self.point is None else self.point
 
     @cached_property
     def misses(self) -> Array:
         """Distance at which each of the c curves passes the reference point, and its deviation, (c, 2)."""
-        curves = self.known_curves or curves_through(*stacked(self.frame.origin[None], [self.contours]))
+        curves = self.known_curves or curves_through(*stacked(self._meeting[None], [self.contours]))
         return misses(curves)[0, : len(self.contours)]
 
     @cached_property
@@ -120,7 +135,7 @@ class Reconstruction:
     def _posterior_of_contacts(self) -> SurfacePosterior:
         """What contacts show without measured normals or a process, in the frame and in units of L."""
         k1, k2 = self.patch.k1 * self.radius, self.patch.k2 * self.radius
-        return posterior_of(k1, k2, self.contacts / self.radius, self.noise)
+        return posterior_of(k1, k2, self.contacts / self.radius, self.noise, self.point_std)
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The height of the surface at local (x, y), in their shape.
@@ -277,15 +292,16 @@ class Reconstruction:
 
         Raises ValueError for any other matrix.
         """
-        scale, turn, _ = similarity(matrix)
-        geometry = self.geometry.moved(matrix)
-        start, end = self.frame.origin, geometry.frame.origin
+        scale, turn, shift = similarity(matrix)
+        start = self._meeting
+        end = scale * turn @ start + shift
         return replace(
             self,
-            geometry=geometry,
+            geometry=self.geometry.moved(matrix),
             patch=self.patch.scaled(scale),
             contours=tuple(contour.moved(scale, turn, start, end) for contour in self.contours),
             strokes=end + scale * (self.strokes - start) @ turn.T,
+            point=None if self.point is None else end,
             known_height_std=None,
             known_curves=None,
         )
@@ -310,10 +326,11 @@ class Reconstruction:
         """The number of deviations, and the share of L, by which a curve is off what the others show."""
         if self.method != "bayes":
             return 0.0, 0.0
-        off_point = (distances_from_point(contour.points - self.frame.origin)[1] for contour in self.contours)
-        sizes = [int(np.count_nonzero(counted)) for counted in off_point]
+        sizes = [int(np.count_nonzero(counted)) for counted in self._off_point]
         curve = np.repeat([*range(len(sizes)), -1], [*sizes, len(self.strokes)])
-        return contradicting_curve(self.contacts / self.radius, curve, self.posterior, self.noise)
+        return contradicting_curve(
+            self.contacts / self.radius, curve, self.posterior, self.noise, self.point_std
+        )
 
     @cached_property
     def _fitted_normals(self) -> tuple[Array, Array]:

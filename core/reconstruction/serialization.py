@@ -21,7 +21,7 @@ from .options import METHODS
 from .result import Reconstruction
 from .status import Taps
 
-VERSION = 3
+VERSION = 4
 ORTHONORMAL = 1e-6  # Axes may be off by so much, because files may have them in single precision.
 COEFFICIENTS = [terms_to(degree) - FREE for degree in range(2, 7)]  # Numbers of coefficients by degree.
 
@@ -29,7 +29,7 @@ COEFFICIENTS = [terms_to(degree) - FREE for degree in range(2, 7)]  # Numbers of
 def to_dict(r: Reconstruction) -> dict[str, Any]:
     """A reconstruction as JSON has it: a dict of numbers, words, lists and dicts, which `from_dict` reads.
 
-    Lengths are in the caller's unit, those of the geometry in its frame. `noise` and `posterior` are in
+    Lengths are in the caller's unit, those of the geometry in its frame. `noise`, `point_std` and `posterior` are in
     units of the radius; the latter is None for the paper's methods, whose surface is `patch`. `status` and
     `message` are for readers only: they follow from the rest.
     """
@@ -41,6 +41,8 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
         "message": r.message,
         "converged": r.converged,
         "noise": r.noise,
+        "point": None if r.point is None else r.point.tolist(),
+        "point_std": r.point_std,
         "mean_height_std": r.mean_height_std,
         "geometry": {
             "frame": {"origin": r.frame.origin.tolist(), "axes": r.frame.axes.tolist()},
@@ -81,13 +83,15 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
     method, strokes, patch = _of(d, "method"), _of(d, "strokes"), _polynomial(_of(d, "patch"))
     if not isinstance(method, str) or method not in METHODS:
         raise ValueError(f"method: expected one of {', '.join(METHODS)}, got {shown(method)}")
-    surface = _posterior(_of(d, "posterior")) if method == "bayes" else None
+    point, surface = _of(d, "point"), _posterior(_of(d, "posterior")) if method == "bayes" else None
     r = Reconstruction(
         geometry=_geometry(_of(d, "geometry"), surface or patch),
         patch=patch,
         contours=_contours(_of(d, "contours"), may_be_none=strokes is not None),
         noise=number("noise", _of(d, "noise"), least=0.0),
         method=method,
+        point=None if point is None else finite_array("point", point, (3,), LARGEST),
+        point_std=number("point_std", _of(d, "point_std"), least=0.0),
         converged=_converged(_of(d, "converged")),
         strokes=np.empty((0, 3)) if strokes is None else finite_array("strokes", strokes, (None, 3), LARGEST),
         taps=_taps(d.get("taps")),

@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import Array
-from ..bayes.joint_fit import Observations, joint_fit
+from ..bayes.joint_fit import MISFIT, Observations, joint_fit
 from ..bayes.posterior import SurfacePosterior
 from ..bayes.process_fit import process_fit
+from ..bayes.sextic import offset_share
 from ..contours.contour import Contour
 from ..contours.curves import Curves
 from ..contours.local_geometry import DegenerateCurvesError, Frame
@@ -42,7 +43,7 @@ def fitted_stack(
     if touches[0].strokes_only:
         start, contours, errors = strokes_start(points, touches, outward, options.noise, options.radius)
     else:
-        start, contours, errors = curves_start(points, touches, outward, options.noise)
+        start, contours, errors = curves_start(points, touches, outward, options)
     if start is None:
         return [error for error in errors if error is not None]
     fit, row = _fit(start, options), count()
@@ -66,7 +67,7 @@ def _fit(start: Start, options: FitOptions) -> _Fit:
     normals = given.normals[rows, kept] if given.normals.size else given.normals
     given = given._replace(contacts=contacts[rows, kept], normals=normals)
     k1, k2 = start.kappas.T
-    turns, posteriors, found = joint_fit(given, weights[rows, kept], k1, k2, not start.strokes_only)
+    turns, posteriors, found = joint_fit(given, weights[rows, kept], k1, k2)
     weights[rows, kept] = found
     local = contacts @ turns
     if options.degree == "auto":
@@ -80,20 +81,21 @@ def _fit(start: Start, options: FitOptions) -> _Fit:
 def _with_processes(start: Start, fit: _Fit, posteriors: SurfacePosterior, weights: Array) -> _Fit:
     """The joint fit in unit radius; where evidence favors a process, with it and in its frame."""
     points, axes, radii, contacts = fit[:4]
-    if start.strokes_only:
-        offset = (weights * posteriors.residuals(contacts)).sum(axis=1) / weights.sum(axis=1)
-        contacts[..., 2] -= offset[:, None]
-        points = points + (radii * offset)[:, None] * axes[..., 2]
+    offset = (weights * posteriors.residuals(contacts)).sum(axis=1) / weights.sum(axis=1)
+    offset *= offset_share(weights, start.point_stds / np.maximum(start.stds, MISFIT * start.radii))
+    contacts[..., 2] -= offset[:, None]
+    points = points + (radii * offset)[:, None] * axes[..., 2]
     # The radius is the distance of the farthest contact of curves, or of strokes where there are no curves.
     places = contacts.shape[1] if start.strokes_only else start.curves.present[0].size
     farthest = np.hypot(contacts[..., 0], contacts[..., 1])[:, :places].max(axis=1)
-    radii, contacts, posteriors = (
+    radii, contacts, posteriors, offset = (
         radii * farthest,
         contacts / farthest[:, None, None],
         posteriors.scaled(1.0 / farthest),
+        offset / farthest,
     )
     given = _observations(start, axes, radii, contacts)
-    turns, scales, found = process_fit(given, weights, posteriors, start.ranks(), not start.strokes_only)
+    turns, scales, found = process_fit(given, weights, posteriors, start.ranks(), -offset)
     contacts = contacts @ turns / scales[:, None, None]
     return _Fit(points, axes @ turns, radii * scales, contacts, fit.degrees, found)
 
@@ -106,7 +108,8 @@ def _observations(start: Start, axes: Array, radii: Array, contacts: Array) -> O
         of_curves = (start.curves.normals @ axes[:, None]).reshape(len(contacts), -1, 3)
         normals[:, : of_curves.shape[1]] = of_curves
     tangent = (start.tangents[:, None] @ axes)[:, 0]
-    return Observations(contacts, normals, tangent, start.stds / radii, start.stds_are_known)
+    stds, point_stds = start.stds / radii, start.point_stds / radii
+    return Observations(contacts, normals, tangent, stds, start.stds_are_known, point_stds)
 
 
 def _result(
@@ -133,15 +136,18 @@ def _result(
         surface: HeightField = patch.scaled(1.0 / scale)
     else:
         surface, patch = fit.posteriors[i], fit.posteriors[i].patch(fit.degrees[i]).scaled(scale)
+    is_known = bool(start.point_stds[i] < start.radii[i])
     return Reconstruction(
         Geometry(frame, scale, surface, domain.scaled(scale)),
         patch,
         tuple(contours),
         noise=float(start.stds[i] / fit.radii[i]),
+        point_std=float(start.point_stds[i] / fit.radii[i]),
         method=options.method,
         converged=converged,
         strokes=frame.to_world(scale * strokes),
-        known_curves=start.curves.at([i]),
+        point=start.points[i] if is_known else None,
+        known_curves=start.curves.at([i]) if is_known else None,
     )
 
 

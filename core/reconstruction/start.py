@@ -11,15 +11,24 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import SURFACE_ENDS, Contour
-from ..contours.curves import LEAST_CONTACTS, Curves, curves_through, misses, stacked
+from ..contours.curves import (
+    LEAST_CONTACTS,
+    Curves,
+    curves_through,
+    distances_from_point,
+    misses,
+    stacked,
+)
 from ..contours.local_geometry import (
     DegenerateCurvesError,
     darboux_frames,
     degeneracy,
     surface_normals,
 )
+from ..bayes.joint_fit import MISFIT
 from ..contours.thinning import thinned
 from ..patch.domain import AT_POINT, Domain, closed_spline_domain
+from .options import FitOptions
 from .strokes import STRIPS, FirstFrame, first_frame, means, toward_farthest
 
 AWAY = 0.1  # Beyond this share of a curve's size, the point is not on it.
@@ -57,6 +66,7 @@ class Start(NamedTuple):
     strokes: list[Array]  # (m, 3) each, in the axes and in unit radius
     stds: Array  # (b,)
     stds_are_known: NDArray[np.bool_]  # (b,), to be all of the noise; of means it is more
+    point_stds: Array  # (b,), of the points along the normal; the radius where contacts alone show it
 
     @property
     def strokes_only(self) -> bool:
@@ -89,7 +99,7 @@ class Start(NamedTuple):
 Started = tuple[Start | None, list[list[Contour]], list[DegenerateCurvesError | None]]
 
 
-def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: float | None) -> Started:
+def curves_start(points: Array, given: Sequence[Given], outward: Array, options: FitOptions) -> Started:
     """The start of fits to contours, with or without strokes; the thinned contours; and errors."""
     thin = [[thinned(c, point) for c in touch.contours] for point, touch in zip(points, given, strict=True)]
     touches = [[contour for contour, _ in c] for c in thin]
@@ -107,18 +117,32 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
     ]
     stds = [
         _std(
-            noise,
+            options.noise,
             max(size, min(number for _, number in thin[i])),
             [*(c.noise or 0.0 for c in touches[i]), given[i].noise / math.sqrt(size)],
         )
         for i, (_, size) in zip(good, strokes, strict=True)
     ]
     known = [
-        not len(contacts) and (noise is not None or None not in [c.noise for c in touches[i]])
+        not len(contacts) and (options.noise is not None or None not in [c.noise for c in touches[i]])
         for i, (contacts, _) in zip(good, strokes, strict=True)
     ]
     contacts = [contacts for contacts, _ in strokes]
-    start = Start(points[good], axes, kappas, radii, curves, contacts, np.array(stds), np.array(known))
+    point_stds = [
+        _point_std(points[i], given[i].contours, options, radius)
+        for i, radius in zip(good, radii, strict=True)
+    ]
+    start = Start(
+        points[good],
+        axes,
+        kappas,
+        radii,
+        curves,
+        contacts,
+        np.array(stds),
+        np.array(known),
+        np.array(point_stds),
+    )
     return start, touches, errors
 
 
@@ -158,6 +182,20 @@ def away_from(point: Array, contours: Sequence[Contour]) -> DegenerateCurvesErro
         f"curve {worst + 1} passes the reference point at {away[worst]:.3g}, more than a tenth of its size: "
         "set the point where the curves meet"
     )
+
+
+def _point_std(point: Array, contours: Sequence[Contour], options: FitOptions, radius: float) -> float:
+    """The standard deviation of a reference point along the normal, before contacts are known, a length.
+
+    A point that is a contact of a curve was touched, and has its noise. Any other was found from the
+    contacts, or set beside them: only they show where the surface is.
+    """
+    if options.point_std is not None:
+        return options.point_std
+    if all(distances_from_point(contour.points - point)[1].all() for contour in contours):
+        return radius
+    noises = [options.noise] if options.noise is not None else [contour.noise for contour in contours]
+    return max((MISFIT * radius if noise is None else noise) for noise in noises)
 
 
 def _std(noise: float | None, size: int, known: list[float]) -> float:
@@ -218,6 +256,7 @@ def strokes_start(
         strokes=[contacts for contacts, _ in thin],
         stds=np.array([_std(noise, size, [given[i].noise / math.sqrt(size)]) for i, size in sizes]),
         stds_are_known=np.zeros(len(good), dtype=bool),
+        point_stds=np.array([first.radius for first in firsts.values()]),
     )
     return start, none, errors
 

@@ -135,11 +135,12 @@ def _about_point(r: Judged) -> Iterator[str]:
     """Whether curves miss the point, which makes everything else doubtful, too."""
     distances, stds = r.misses.T / r.radius
     stds = np.maximum(stds, LEAST_SCATTER * r.noise)
+    stds = stds if r.point is None else np.hypot(stds, r.point_std)
     apart = distances > np.maximum(DOUBTFUL_MISS, SIGNIFICANT * stds)
     if apart.any():
         worst = np.argmax(np.where(apart, distances, 0.0))
         # If the point is one of its contacts, the fit to these is off.
-        if r.contours[worst].distance_to(r.frame.origin) <= OWN_POINT * r.radius:
+        if r.point is not None and r.contours[worst].distance_to(r.point) <= OWN_POINT * r.radius:
             yield (
                 f"Curve {worst + 1} bends so sharply at the point that its fit is "
                 f"{100.0 * distances[worst]:.2g} % of the radius off there: move the point away from edges, "

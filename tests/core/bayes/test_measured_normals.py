@@ -185,7 +185,7 @@ def test_the_evidence_is_that_of_heights_and_slopes_under_a_normal_distribution(
     local = np.column_stack([rng.uniform(-0.9, 0.9, (60, 2)), 0.02 * rng.normal(size=60)])[None]
     normals = np.array([0.0, 0.0, 50.0]) + rng.normal(size=(1, 60, 3))
     weights, noises = np.ones((1, 60)), np.array([[2e-3, 9e-3]])
-    data = sextic.sextics(local, weights, np.zeros((1, 27)), normals)
+    data = sextic.sextics(local, weights, np.zeros((1, 27)), normals, np.zeros(1))
     variances = np.minimum(prior.prior_variances(np.array([0.4, 0.9])), 100.0)
     slopes, steepness = (part[0] for part in slope_equations(normals, local, weights))
     heights, basis = local[0, :, 2], np.vstack([monomials(local[0], TERMS), slopes])

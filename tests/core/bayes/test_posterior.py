@@ -38,7 +38,7 @@ def test_intervals_count_in_that_waviness_and_noise_are_estimates(count, freedom
     flat = np.random.default_rng(0).uniform(-0.7, 0.7, (2, count))
     contacts = np.array([*flat, 0.1 * flat[0] ** 2]).T[None]
     expected, weights = prior.prior_mean(np.array([0.2]), np.zeros(1)), np.ones((1, count))
-    data = sextic.sextics(contacts, weights, expected, contacts[:, :0])
+    data = sextic.sextics(contacts, weights, expected, contacts[:, :0], np.zeros(len(weights)))
     hyper = data.hyperparameters(np.array([2e-3]))
     found = sextic.posterior_given(expected, data, hyper).at(0).covariance
     precision = data.heights[0, :-1, :-1] / hyper.noise**2 + np.diag(1.0 / hyper.prior[0])
@@ -126,10 +126,13 @@ def test_intervals_cover_surfaces_drawn_from_the_prior(planes):
     assert 0.85 < np.mean(covered) < 0.97
 
 
-def test_height_std_is_zero_at_the_point_and_grows_with_noise_and_between_the_curves():
+def test_height_std_is_that_of_the_point_there_and_grows_with_noise_and_between_the_curves():
     s = surfaces.pear()
     fine, coarse = touched(s, noise=0.01), touched(s, noise=0.3)
-    assert fine.height_std(0.0, 0.0) == pytest.approx(0.0, abs=1e-12)
+    assert touched(s, noise=0.0).height_std(0.0, 0.0) == 0.0
+    for r, noise in ((fine, 0.01), (coarse, 0.3)):
+        assert 0.1 * noise < r.height_std(0.0, 0.0) < noise
+    assert touched(s, noise=0.3, point_std=0.0).height_std(0.0, 0.0) == 0.0
     assert fine.height_std(np.zeros((2, 3)), 1.0).shape == (2, 3)
     assert coarse.mean_height_std > 5 * fine.mean_height_std
     assert coarse.posterior.noise * coarse.radius > 0.25
@@ -453,11 +456,11 @@ def test_what_is_expected_of_a_plane_is_the_posterior_with_its_contacts_added(st
     count = round(len(r.contacts) / 3)
     few = min(count, 24)
     t = np.linspace(-1.0, 1.0, few)[:, None] * [np.cos(plane.azimuth), np.sin(plane.azimuth)]
-    basis = monomials(t, TERMS)
-    noise = r.posterior.noise**2 * few / count
-    after = np.linalg.inv(np.linalg.inv(r.posterior.covariance) + basis.T @ basis / noise)
+    basis = np.column_stack([monomials(t, TERMS), np.ones(few)])
+    noise, root = r.posterior.noise**2 * few / count, r.posterior.root
+    after = np.linalg.inv(np.linalg.inv(root.T @ root) + basis.T @ basis / noise)
     points, weights = r.domain.nodes
-    over = monomials(points / r.radius, TERMS)
+    over = np.column_stack([monomials(points / r.radius, TERMS), np.ones(len(points))])
     stds = np.sqrt(np.einsum("ni,ij,nj->n", over, after, over))
     assert expected == pytest.approx(r.radius * weights @ stds, rel=1e-5)
 

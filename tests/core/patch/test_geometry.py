@@ -64,7 +64,7 @@ def test_the_reference_point_stays_on_its_curves_far_from_the_origin():
     r = touched()
     moved = r.moved(matrix_of(TURN, [1e7, -3e6, 2e6]))
     assert len(moved.contacts) == len(r.contacts)
-    assert all((contour.points == moved.frame.origin).all(axis=1).any() for contour in moved.contours)
+    assert all((contour.points == moved.point).all(axis=1).any() for contour in moved.contours)
 
 
 @pytest.mark.parametrize(

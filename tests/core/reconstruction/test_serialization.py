@@ -61,7 +61,7 @@ def test_far_from_the_origin_it_is_the_same_too(method):
 
 def test_it_says_what_it_is():
     d = to_dict(RESULTS[0])
-    assert d["version"] == 3
+    assert d["version"] == 4
     assert d["status"] == RESULTS[0].status
     assert len(d["contours"]) == 3
     assert len(d["contours"][0]["points"]) == 25
@@ -100,7 +100,7 @@ def test_a_damaged_dict_is_refused_with_a_sentence(key, value):
 @pytest.mark.parametrize(
     ("path", "value", "words"),
     [
-        (["version"], 2, "version: expected 3, got 2: this was written by another release"),
+        (["version"], 2, "version: expected 4, got 2: this was written by another release"),
         (["geometry", "radius"], None, "radius: expected it in the dict of a reconstruction, got none"),
         (["geometry", "radius"], 1e-300, "radius: expected a finite number of 1e-50 or more"),
         (["method"], "magic", "method: expected one of bayes"),

@@ -119,8 +119,20 @@ def test_curves_that_bend_at_a_point_of_their_own_get_no_advice_to_meet_elsewher
     assert "move the point away from edges, or make the facets finer" in message
 
 
-@pytest.mark.parametrize("share", [0.1, 0.3, 3.0])
-@pytest.mark.parametrize("way", ["normal", "across"])
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.3])
+def test_a_point_above_the_curves_is_only_a_place(share):
+    s = surfaces.pear()
+    contours = contours_of(s, noise=0.02)
+    off = share * np.ptp(contours[0].points, axis=0).max()
+    r = reconstruct(s.point + off * s.normal, contours, outward=s.normal)
+    assert r.status == "ok"
+    assert abs((r.frame.origin - s.point) @ s.normal) < 5.0 * r.height_std(0.0, 0.0)
+    assert max(abs(r.k1 - s.k1) / r.k1_std, abs(r.k2 - s.k2) / r.k2_std) < 3.0
+
+
+@pytest.mark.parametrize(
+    ("way", "share"), [("normal", 3.0), ("across", 0.1), ("across", 0.3), ("across", 3.0)]
+)
 def test_a_point_off_the_curves_is_reported_before_anything_that_follows_from_it(share, way):
     s = surfaces.pear()
     contours = contours_of(s, noise=0.02)

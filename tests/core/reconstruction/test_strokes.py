@@ -122,7 +122,7 @@ def test_with_contours_strokes_bring_the_patch_nearer(count):
             with_strokes.append(error)
             within.append(share)
             without.append(judged(surface, surface.fit(contours, noise=noise))[0])
-            assert np.array_equal(r.frame.origin, surface.point)
+            assert np.linalg.norm(r.frame.origin - surface.point) < 4.0 * r.height_std(0.0, 0.0)
     assert np.mean(with_strokes) < (0.9 if count == 300 else 0.6) * np.mean(without)
     assert np.mean(within) >= 0.8
 
@@ -211,7 +211,7 @@ def test_the_patch_moves_with_its_contacts(count, with_contours, scale, turn, sh
     one = reconstruct(place, contours, outward=surface.normal, strokes=[points])
     other = reconstruct(
         moved(place),
-        [Contour(moved(c.points)) for c in contours],
+        [Contour(moved(c.points), noise=0.0) for c in contours],
         outward=turn @ surface.normal,
         strokes=[moved(points)],
     )
