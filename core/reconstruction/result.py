@@ -46,7 +46,7 @@ class Reconstruction:
     strokes : the other fitted contacts, in the world, (n, 3); means of neighbors if there are many
     noise : noise floor, the standard deviation that a contact has at least, in units of L
     method : the method of the fit
-    point : (3,), the reference point, if it was touched or given with a deviation; None where contacts show it
+    point : (3,), the reference point, if it was touched or has a given deviation; None where contacts show it
     point_std : its standard deviation along the normal, in units of L; 1 where contacts show it
     converged : whether its solver converged
     taps : what was felt between the curves; None if nobody tapped there

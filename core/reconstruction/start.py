@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..bayes.joint_fit import MISFIT
 from ..contours.contour import SURFACE_ENDS, Contour
 from ..contours.curves import (
     LEAST_CONTACTS,
@@ -25,7 +26,6 @@ from ..contours.local_geometry import (
     degeneracy,
     surface_normals,
 )
-from ..bayes.joint_fit import MISFIT
 from ..contours.thinning import thinned
 from ..patch.domain import AT_POINT, Domain, closed_spline_domain
 from .options import FitOptions

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reference points that were found from noisy contacts, or touched with noise: intervals hold all the same."""
+"""Reference points that were found from noisy contacts, or touched with noise: intervals hold around them."""
 
 import math
 from pathlib import Path
@@ -15,7 +15,7 @@ NOISE, RADIUS, EXTENT = 0.02, 25.0, 10.0
 
 
 def contours_of(count, seed, noise=None):
-    """Three contours of a ball with noise in all directions, and the outward direction; none has the point."""
+    """Three contours of a ball with noise in all directions, without the point, and the outward direction."""
     s, rng = surfaces.sphere(RADIUS), np.random.default_rng(seed)
     azimuths = np.array((0, 60, 120)) + rng.uniform(0, 60)
     tracked = s.track(surfaces.planes(azimuths), extent=EXTENT, step=2.0 * EXTENT / (count - 1))
@@ -24,7 +24,7 @@ def contours_of(count, seed, noise=None):
 
 
 def judged(r):
-    """Whether 90 % intervals hold the curvatures, (2,), the heights, a share, and the height at the origin."""
+    """The shares of curvatures and of heights that 90 % intervals hold, and whether the origin's does."""
     flat = np.vstack([r.domain.grid(100)[0], np.zeros((1, 2))])
     base, up = r.frame.to_world(np.column_stack([flat, np.zeros(len(flat))])), r.normal
     along = base @ up
