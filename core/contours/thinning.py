@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contours of very many contacts as fewer, each the mean of neighbors along the curve.
+"""Contours of very many contacts, or with rests, as fewer: each the mean of neighbors along the curve.
 
 The fit takes the places of contacts in the tangent plane for exact. Noise in all directions also scatters
 contacts sideways, off their sampling plane, and many of them would then seem to show the shape next to it.
-The mean of k neighbors has a kth of their variance, and determines heights as well.
+The mean of k neighbors has a kth of their variance, and determines heights as well. Contacts of a finger at
+rest share one error, so a rest weighs as much as any other place of the curve.
 """
 
 import math
@@ -19,32 +20,37 @@ from .curves import WINDOW, distances_from_point
 
 # With this many contacts a contour no fit is worse, with noise in all directions (tests: test_thinning).
 MOST_CONTACTS = 100
+# test_thinning judges these: no rest may ruin a fit, and no contacts without one may change.
+CELLS = 1000  # The curve's longer side has so many cells. A place is a cell and its neighbors.
+RESTING = 4  # A place with more times the usual number of contacts is a rest.
+TANGENT = 1 / 16  # This share of the cells with contacts shows the tangent, also that of a steep curve.
+DECIMALS = 9  # Weights are compared to this decimal, so that rounding does not choose.
 
 
 def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:
     """The contour of at most MOST_CONTACTS means besides the point, and the number of contacts in each mean.
 
-    It runs as the given contour does; noise and normal_std are those of the means.
+    It runs as the given contour does; noise and normal_std are those of the means. A rest counts as the usual
+    number of contacts. At most MOST_CONTACTS without a rest stay as they are.
     """
-    if len(contour.points) <= MOST_CONTACTS:
-        return contour, 1
     r = contour.points - point
-    off_point = np.flatnonzero(distances_from_point(r)[1])
-    size = math.ceil(len(off_point) / MOST_CONTACTS)
-    if size <= 1:
+    if len(r) <= MOST_CONTACTS and not _may_rest(r):
         return contour, 1
-    r = r[off_point]
-    along = _signed_positions(r, max(WINDOW * size, len(r) // 4))
+    distance, off_point = distances_from_point(r)
+    r, distance = r[off_point], distance[off_point]
+    if len(r) <= RESTING:
+        return contour, 1
+    along, weights = _along(r, distance)
     order = np.argsort(along, kind="stable")
-    before = int(np.count_nonzero(along < 0.0))
-    # Groups are counted from the point outward, so that the way in which a contour runs makes no difference.
-    behind, ahead = _group_bounds(before, size), _group_bounds(len(order) - before, size)
-    starts = np.concatenate([before - behind[:0:-1], before + ahead[:-1]])
-    counts = np.diff(starts, append=len(order))[:, None]
+    weights = weights[order]
+    starts, size = _groups(weights, int(np.count_nonzero(along < 0.0)))
+    if size <= 1 and weights.min() == 1.0:
+        return contour, 1
+    totals = np.add.reduceat(weights, starts)[:, None]
 
     def means(values: Array) -> Array:
         """The means (m, 3) of the groups among values (n, 3)."""
-        return np.add.reduceat(values[order], starts, axis=0) / counts
+        return np.add.reduceat(weights[:, None] * values[order], starts, axis=0) / totals
 
     normals, noise, std = contour.normals, contour.noise, contour.normal_std
     root = math.sqrt(size)
@@ -58,20 +64,52 @@ def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:
     return fewer, size
 
 
-def _signed_positions(r: Array, count: int) -> Array:
-    """Signed positions (n,) of contacts (n, 3) on the principal axis of the `count` nearest ones.
+def _may_rest(r: Array) -> bool:
+    """Whether contacts (n, 3), relative to the point, may have a rest; a quick no for most that have none."""
+    distance = np.sort(np.sqrt(np.einsum("ni,ni->n", r, r)))
+    return bool((distance[RESTING:] - distance[:-RESTING] <= 3.0 / CELLS * distance[-1:]).any())
 
-    Contacts are relative to the point. The sign makes positions rise with the index.
+
+def _along(r: Array, distance: Array) -> tuple[Array, Array]:
+    """Distances (n,) of contacts (n, 3) from the point, below 0 on one side of it, and their weights up to 1.
+
+    The sign makes them rise with the index.
     """
-    # It takes the tangent of `count` contacts near the point, because a steep curve's longest axis is its
-    # normal.
-    near = r[np.argsort(np.einsum("ni,ni->n", r, r), kind="stable")[:count]]
-    along = r @ np.linalg.eigh(near.T @ near)[1][:, -1]
+    # So few contacts as can be no rest may be stray ones, far out, and say nothing about the curve's length.
+    cells = np.ceil(distance * (CELLS / np.partition(distance, -RESTING)[-RESTING]))
+    cells = np.minimum(cells, 2 * CELLS).astype(np.intp)
+    counts = np.bincount(cells)
+    # Contacts near the point show the tangent, because a steep curve's longest axis is its normal.
+    filled = np.cumsum(counts > 0)
+    near = np.flatnonzero(cells <= np.searchsorted(filled, max(WINDOW, TANGENT * filled[-1])))
+    moments = r[near].T @ (r[near] / counts[cells[near], None])
+    along = np.copysign(distance, r @ np.linalg.eigh(moments)[1][:, -1])
     along *= np.copysign(1.0, (np.arange(len(along)) - (len(along) - 1) / 2.0) @ along)
-    return along
+    cells = 2 * CELLS + np.where(along < 0.0, -cells, cells)
+    return along, _weights(np.bincount(cells))[cells]
 
 
-def _group_bounds(length: int, size: int) -> NDArray[np.intp]:
-    """The bounds, from 0 to the length, of groups of about this size; only 0 if the length is 0."""
-    count = max(1, length // size) if length else 0
-    return np.arange(count + 1, dtype=np.intp) * length // max(count, 1)
+def _weights(counts: NDArray[np.intp]) -> Array:
+    """The weight (m,) of a contact in each of the cells along a curve, which have so many contacts (m,)."""
+    crowd = np.maximum(np.convolve(counts, np.ones(3), mode="same"), 1.0)
+    shares = counts / crowd
+    places = shares.sum()
+    # The usual number is a mean over the length, in which rests do not count.
+    usual = places / (shares / crowd).sum() if places > MOST_CONTACTS else 1.0
+    return np.where(crowd > RESTING * usual, usual / crowd, 1.0)
+
+
+def _groups(weights: Array, before: int) -> tuple[NDArray[np.intp], int]:
+    """The starts (m,) of groups of contacts with weights (n,), `before` of them before the point; their size.
+
+    The size is the weight that each has at least, about.
+    """
+    totals = float(weights[:before].sum()), float(weights[before:].sum())
+    size = math.ceil(sum(map(round, totals)) / MOST_CONTACTS)
+    middles = (np.cumsum(weights) - 0.5 * weights - totals[0]).round(DECIMALS)
+    # Groups are counted from the point outward, so that the way in which a contour runs makes no difference.
+    behind, ahead = (max(1, round(total) // size) if total else 0 for total in totals)
+    before_point = (np.arange(-behind, 0) * (totals[0] / max(behind, 1))).round(DECIMALS)
+    after_point = (np.arange(ahead) * (totals[1] / max(ahead, 1))).round(DECIMALS)
+    starts = middles.searchsorted(before_point, side="right"), middles.searchsorted(after_point)
+    return np.unique(np.concatenate(starts)), size
