@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+import solids
 import surfaces
 
 import core
@@ -137,6 +138,16 @@ def test_touches_are_the_same_where_normals_face_the_ray(surface, size):
     assert [(e.extent, e.result.status, e.result.taps) for e in other] == [
         (e.extent, e.result.status, e.result.taps) for e in one
     ]
+
+
+def test_whole_objects_are_the_same_where_normals_face_the_ray():
+    for solid in (solids.block(), solids.egg()):
+        one, other = (
+            core.explore_object(each, solid.start, solid.outward, tolerance=0.02, rng=0)
+            for each in (solid, Facing(solid))
+        )
+        assert (other.status, len(other.patches)) == ("ok", len(one.patches))
+        assert np.abs(solid.distances(other.mesh(0.15).vertices)).max() < 0.01
 
 
 class HalfPlane(Levels):
