@@ -24,7 +24,12 @@ Contact = tuple[Vector, Vector]  # A point of the surface and its outward normal
 
 
 class Surface(Protocol):
-    """Anything that can be touched."""
+    """Anything that can be touched.
+
+    Normals are outward, or on one side of a sheet, wherever rays come from. Normals that face the ray, as
+    many ray casters answer, do as well: only where a patch is off by half of the thickness of a wall or more,
+    the wall's other side may pass for the surface.
+    """
 
     def ray_cast(self, origin: Vector, direction: Vector, distance: float) -> "Hit | None":
         """The first point within `distance` along the unit `direction` and the unit normal there, or None."""

@@ -14,9 +14,10 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import CONTRADICTING, DOUBTFUL_GAP, over_nothing
 
 # benchmarks.refusals counts the patches that are off, but ok.
-MESH_LAYERS = 4  # A sample is compared with no more layers of the mesh above and below it,
+MESH_LAYERS = 8  # A sample is compared with no more layers of the mesh above and below it,
 HAIR = 1e-4  # and rays go on this share of their reach beyond each.
-SIDE_HEIGHT = 0.01  # The side of the surface is felt from so far above the point, as a share of the radius.
+# Rays begin at this share of the radius above a patch: one tells where the surface is near, as it mostly is.
+ABOVE = 0.01
 
 
 class MeshError(NamedTuple):
@@ -52,7 +53,7 @@ def offs_at(r: Reconstruction, surface: Surface, points: Array, side: float) -> 
 
 def side_of(r: Reconstruction, surface: Surface) -> float:
     """1 if the outside of the surface is up at the point, or -1 if it is down: a sheet has either side."""
-    up, reach = vector_of(r.frame.axes[:, 2]), SIDE_HEIGHT * r.radius
+    up, reach = vector_of(r.frame.axes[:, 2]), ABOVE * r.radius
     start = along(vector_of(r.frame.origin), up, reach)
     hit = surface.ray_cast(start, scaled(up, -1.0), 2.0 * reach)
     return 1.0 if hit is None else math.copysign(1.0, dot(contact_of(hit, 1.0)[1], up))
@@ -76,22 +77,23 @@ def layer_off(surface: Surface, start: Vector, up: Vector, reach: float, side: f
     """How far along `up`, in either direction, the nearest layer with its outside up is; None beyond `reach`.
 
     Layers that are seen from inside are another wall of the object, or its other side. With the `side` -1,
-    layers with their outside down count instead.
+    layers with their outside down count instead. All rays come from above, where normals that face the ray
+    are outward ones, except on the undersides of walls, which count as layers then.
     """
-    nearest, hair = None, HAIR * reach
-    for sign in (1.0, -1.0):
-        # Rays that begin on the mesh, but for rounding, may miss all of it.
-        gone, direction = -hair, scaled(up, sign)
+    down, hair, nearest = scaled(up, -1.0), HAIR * reach, None
+    for top in (ABOVE * reach, reach):
+        height, bottom = top, -top
         for _ in range(MESH_LAYERS):
-            hit = surface.ray_cast(along(start, direction, gone), direction, reach - gone)
+            length = height - bottom
+            hit = surface.ray_cast(along(start, up, height), down, length) if length > 0.0 else None
             if hit is None:
                 break
             point, normal = contact_of(hit, side)
-            gone = abs(dot(along(point, start, -1.0), up))
+            height = dot(along(point, start, -1.0), up)
             if dot(normal, up) > 0.0:
-                nearest = reach = gone
-                break
-            gone += hair
-            if gone >= reach:
-                break
+                nearest = abs(height)
+                bottom = -nearest
+            height -= hair
+        if nearest is not None:
+            break
     return nearest

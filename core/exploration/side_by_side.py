@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Many touches side by side that choose their size, in steps; their fits come in stacks."""
 
+import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -10,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, unit_vector
-from ..contours.contour import EXTENT, Contour, SamplingPlane
-from ..contours.finger import SAME_SHEET_COSINE, Surface
+from ..contours.contour import EXTENT, Contour, SamplingPlane, Vector, along, scaled, vector_of
+from ..contours.finger import SAME_SHEET_COSINE, Surface, contact_of
 from ..contours.tracking import generator_of, track, tracker
 from ..reconstruction.deviations import with_height_stds
 from ..reconstruction.from_contours import fitted
@@ -20,16 +21,19 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.start import Given
 from ..reconstruction.strokes import gathered
 from .growth import Answer, Request
+from .mesh_error import HAIR
 from .one_touch import Exploration, Steps, Touch
 from .options import ExplorationOptions
 from .taps import tapped
 
 GLANCE_CONTACTS = 8  # A half curve has this many contacts where it only has to show whether it ends.
-LONGEST = 1e15  # Lengths beyond this, or below its inverse, are not tried.
+LONGEST = 1e15  # Lengths beyond this multiple of the first that is tried, or below its inverse, are not.
 # With a given deviation, as for a whole object, touches end where the cosine between successive normals is
 # below SAME_SHEET_COSINE; all others end at none.
 ANY_COSINE = -1.0
-BISECTIONS = 6  # They narrow a factor of two to a 64th of it.
+BISECTIONS = 6  # They narrow a factor of two to a 64th of it,
+SHEET_BISECTIONS = 26  # and these so far that what they began with changes results by less than 1e-6.
+ODD = math.e  # Fractions of an object's size would end exactly on its edges, those of this multiple do not.
 
 Found = Generator[None, None, list[Exploration | ValueError]]
 
@@ -51,14 +55,15 @@ def exploring_many(
 
     def steps(point: Array, direction: Array) -> Steps:
         """The steps of one touch."""
-        place = surface, point, direction
+        place = surface, vector_of(point), vector_of(direction)
         touch = Touch(
             partial(
                 tracker, *place, noise=options.noise, rng=generator, tangent=tangent, least_cosine=cosine
             ),
             point,
             reference=SamplingPlane(0.0).axes(direction, tangent),
-            farthest=options.farthest or _farthest(partial(track, *place, options.planes, tangent=tangent)),
+            farthest=options.farthest
+            or _farthest(*place, options.planes, partial(track, *place, tangent=tangent)),
             tap=partial(tapped, surface),
             options=options,
         )
@@ -67,37 +72,71 @@ def exploring_many(
     return _side_by_side([steps(*place) for place in zip(p, up, strict=True)], p, up, options.fit)
 
 
-def _farthest(track_to: Callable[..., list[Contour]]) -> float:
+def _farthest(
+    surface: Surface,
+    point: Vector,
+    outward: Vector,
+    planes: Sequence[SamplingPlane],
+    track_along: Callable[..., list[Contour]],
+) -> float:
     """The length at which all half curves have ended, to one part in 64: by doubling, then bisection.
 
-    track_to : `track` without its extent and step, whose ValueError passes on
+    track_along : `track` as a function of planes, extent and step
+
+    The lengths that are tried follow from the surface, so that another unit does not change what is found.
     """
-    felt: list[float] = []
 
     def ended(length: float) -> bool:
         """Whether all half curves, felt coarsely, end before that, or nothing can be felt at this length."""
+        lengths = {"extent": length, "step": length / GLANCE_CONTACTS}
         try:
-            contours = track_to(extent=length, step=length / GLANCE_CONTACTS)
+            contours = (contour for plane in planes for contour in track_along([plane], **lengths))
+            return not any(EXTENT in (contour.stops or ()) for contour in contours)
         except ValueError:
-            if length <= 1.0 / LONGEST and not felt:
-                raise
             return True
-        felt.append(length)
-        return not any(EXTENT in (contour.stops or ()) for contour in contours)
 
-    least, most = (1.0, 2.0) if not ended(1.0) else (0.5, 1.0)
+    # Lengths that are far shorter than the coordinates are lost to rounding.
+    least, most = _bracket(ended, max(1.0, *map(abs, point)))
+    size = ODD * (_depth(surface, point, outward, least) or _bisected(ended, least, most, SHEET_BISECTIONS))
+    start = size * 2.0 ** math.ceil(math.log2(least / size))
+    return _bisected(ended, *_bracket(ended, start), BISECTIONS)
+
+
+def _bracket(ended: Callable[[float], bool], start: float) -> tuple[float, float]:
+    """Two lengths, one twice the other, between which all half curves end: `start` halved or doubled."""
+    least, most = (start, 2.0 * start) if not ended(start) else (0.5 * start, start)
     while ended(least):
         least, most = 0.5 * least, least
         if least < 1.0 / LONGEST:
             raise ValueError("All curves end at once, however short they are: take another point")
     while not ended(most):
         least, most = most, 2.0 * most
-        if most > LONGEST:
+        if most > start * LONGEST:
             raise ValueError("The curves do not end by themselves: set farthest, the greatest length to feel")
-    for _ in range(BISECTIONS):
+    return least, most
+
+
+def _bisected(ended: Callable[[float], bool], least: float, most: float, count: int) -> float:
+    """The length between two others at which all half curves have ended, after `count` bisections."""
+    for _ in range(count):
         middle = 0.5 * (least + most)
         least, most = (least, middle) if ended(middle) else (middle, most)
     return most
+
+
+def _depth(surface: Surface, point: Vector, outward: Vector, length: float) -> float | None:
+    """The distance of the next wall below a point; None if there is none, as below a sheet.
+
+    length : one to which curves can be felt there, so that a share of it is below the surface at the point
+    """
+    down, longest = scaled(outward, -1.0), length * LONGEST
+    start = along(point, down, HAIR * length)
+    while length < longest:
+        hit = surface.ray_cast(start, down, length)
+        if hit is not None:
+            return math.dist(contact_of(hit, 1.0)[0], point)
+        length *= 2.0
+    return None
 
 
 def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: FitOptions) -> Found:

@@ -3,11 +3,13 @@
 """Automatic extent and step: how far curves grow, what ends them, how many contacts they get."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import solids
 import surfaces
+from scipy.spatial import ConvexHull
 
 import core
 from core.exploration import growth, one_touch, side_by_side
@@ -37,6 +39,18 @@ def rib(at, high, wide):
         lambda x, y: high * np.exp(-(((x - at) / wide) ** 2)),
         lambda x, y: (-2.0 * (x - at) / wide**2 * high * np.exp(-(((x - at) / wide) ** 2)), 0.0),
     )
+
+
+class Scaled:
+    """A surface in another unit of length: each of its lengths has `factor` times the number."""
+
+    def __init__(self, surface, factor):
+        self.surface, self.factor = surface, factor
+
+    def ray_cast(self, origin, direction, distance):
+        f = self.factor
+        hit = self.surface.ray_cast([v / f for v in origin], direction, distance / f)
+        return hit and ([f * v for v in hit[0]], hit[1])
 
 
 def explore(surface, point=(0.0, 0.0, 0.0), normal=UP, planes=PLANES, farthest=30.0, **more):
@@ -261,13 +275,7 @@ def test_what_ends_a_curve_otherwise_still_does():
 @pytest.mark.parametrize("factor", [1e-6, 1e6])
 def test_size_does_not_matter(factor):
     surface = rib(at=9.0, high=0.8, wide=1.0)
-
-    class Scaled:
-        def ray_cast(self, origin, direction, distance):
-            hit = surface.ray_cast([v / factor for v in origin], direction, distance / factor)
-            return None if hit is None else (tuple(factor * v for v in hit[0]), hit[1])
-
-    one, other = explore(surface), explore(Scaled(), farthest=30.0 * factor)
+    one, other = explore(surface), explore(Scaled(surface, factor), farthest=30.0 * factor)
     assert (other.extent, other.step) == pytest.approx((factor * one.extent, factor * one.step), rel=1e-6)
     assert [c.stops for c in other.contours] == [c.stops for c in one.contours]
     assert other.result.patch.k1 * factor == pytest.approx(one.result.patch.k1, rel=1e-3)
@@ -460,22 +468,112 @@ def test_how_far_to_feel_is_found_where_curves_end_by_themselves():
     assert 5.0 < found.extent < 30.0  # along the curve; a quarter circle is 31.4
     assert found.result.status == "ok"
 
-    class Scaled:
-        """The ball sixteen times as large, a factor that is a power of two."""
 
-        def ray_cast(self, origin, direction, distance):
-            hit = ball.ray_cast([v / 16.0 for v in origin], direction, distance / 16.0)
-            return hit and ([16.0 * v for v in hit[0]], hit[1])
+class Hull:
+    """The convex hull of 300 places on an egg, as a mesh."""
 
-    larger = core.explore(Scaled(), 16.0 * np.array(ball.point), ball.normal)
-    assert larger.extent == pytest.approx(16.0 * found.extent)
-    assert 16.0 * larger.result.patch.k1 == pytest.approx(found.result.patch.k1, rel=1e-6)
+    def __init__(self):
+        places = np.random.default_rng(3).normal(size=(300, 3))
+        places *= (12.0, 12.0, 20.0) / np.linalg.norm(places, axis=1, keepdims=True)
+        equations = ConvexHull(places + np.array([40.0, -7.0, 3.0])).equations
+        self.normals, self.offsets = equations[:, :3], equations[:, 3]
+
+    def ray_cast(self, origin, direction, distance):
+        slopes = self.normals @ direction
+        with np.errstate(divide="ignore"):
+            gone = -(self.normals @ origin + self.offsets) / slopes
+        first, last = gone[slopes < 0.0].max(), gone[slopes > 0.0].min()
+        at = next((t for t in (first, last) if first <= last and 0.0 < t <= distance), None)
+        return at and (np.add(origin, at * np.array(direction)), self.normals[np.argmax(gone == at)])
+
+
+class Bowl:
+    """The part of a surface within 12 of the z axis."""
+
+    def __init__(self, surface):
+        self.surface = surface
+
+    def ray_cast(self, *ray):
+        hit = self.surface.ray_cast(*ray)
+        return hit if hit is not None and math.hypot(*hit[0][:2]) <= 12.0 else None
+
+
+def dented(seed=0):
+    """A closed surface around the origin with random dents, touched where the x axis leaves it."""
+    rng = np.random.default_rng(seed)
+    waves, phases = rng.normal(0.0, 0.1, (5, 3)), rng.uniform(0.0, 6.0, 5)
+
+    def level(x, y, z):
+        dents = sum(np.cos(a * x + b * y + c * z + p) for (a, b, c), p in zip(waves, phases, strict=True))
+        return np.sqrt(x * x + y * y + z * z) - 20.0 - dents
+
+    def gradient(p):
+        slopes = [np.sin(wave @ p + phase) * wave for wave, phase in zip(waves, phases, strict=True)]
+        return p / np.linalg.norm(p) + np.sum(slopes, axis=0)
+
+    surface = surfaces.Exact(level, gradient, None, np.nan, np.nan)
+    hit, _ = surface.ray_cast((30.0, 0.0, 0.0), (-1.0, 0.0, 0.0), 30.0)
+    return replace(surface, point=hit)
+
+
+def shifted(surface):
+    """The surface with its point at the origin."""
+    move = surface.point
+    return replace(
+        surface,
+        level=lambda x, y, z: surface.level(x + move[0], y + move[1], z + move[2]),
+        gradient=lambda p: surface.gradient(p + move),
+        point=np.zeros(3),
+    )
+
+
+def placed(surface):
+    return surface, surface.point, surface.normal
+
+
+def on_hull():
+    return Hull(), *Hull().ray_cast((80.0, 10.0, 10.0), (-0.9, -0.3, -0.1), 100.0)
+
+
+WITHOUT_FARTHEST = {
+    "ellipsoid": placed(surfaces.ellipsoid(35, 25, 20, 0.6, 0.5)),
+    "ellipsoid at the origin": placed(shifted(surfaces.ellipsoid(35, 25, 20, 0.6, 0.5))),
+    "torus": placed(surfaces.torus(40, 20, 0.6)),
+    "neck": placed(surfaces.bottle_neck()),
+    "dented": placed(dented()),
+    "hull": on_hull(),
+    "plate": (solids.block(1.0, 0.8, 0.01), (0.05, 0.03, 0.01), UP),
+    "disk": (Bowl(surfaces.plane()), np.zeros(3), UP),
+    "bowl": (Bowl(surfaces.quartic()), np.zeros(3), UP),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "planes"),
+    [*((name, surfaces.UPRIGHT) for name in WITHOUT_FARTHEST), ("torus", surfaces.TILTED)],
+)
+def test_the_unit_of_length_does_not_matter_where_curves_end_by_themselves(name, planes):
+    surface, point, normal = WITHOUT_FARTHEST[name]
+
+    def numbers(factor):
+        found = core.explore(Scaled(surface, factor), factor * np.array(point), normal, planes)
+        r = found.result
+        lengths = np.array([found.extent, found.step, r.radius, r.mean_height_std]) / factor
+        return r, [*lengths, r.radius * r.k1, r.radius * r.k2], [len(c.points) for c in found.contours]
+
+    r, one, counts = numbers(1.0)
+    assert 0.0 < r.radius < 60.0
+    for factor in (3.7, 1e-9, 1e-3, 1e6, 1e12):
+        other, scaled, same_counts = numbers(factor)
+        assert scaled == pytest.approx(one, rel=1e-6, abs=1e-8)
+        assert (other.status, other.message, same_counts) == (r.status, r.message, counts)
 
 
 def test_a_surface_without_an_end_asks_how_far_to_feel():
     said = "The curves do not end by themselves: set farthest, the greatest length"
-    with pytest.raises(ValueError, match=said):
-        core.explore(surfaces.plane(), (0.0, 0.0, 0.0), UP)
+    for factor in (1e-9, 1.0, 1e12):
+        with pytest.raises(ValueError, match=said):
+            core.explore(Scaled(surfaces.plane(), factor), (0.3 * factor, 0.0, 0.0), UP)
 
 
 @pytest.mark.parametrize("count", [3, 5])

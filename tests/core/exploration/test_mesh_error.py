@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+import solids
 import surfaces
 
 import core
@@ -55,6 +56,98 @@ def test_a_plane_that_is_off_has_the_exact_distance(flat, level):
 def test_the_nearest_layer_whose_outside_is_up_counts(flat, levels, off):
     found = core.mesh_error(flat, Levels(*levels)).height
     assert found is None if off is None else found == pytest.approx(off, abs=1e-6)
+
+
+class Facing:
+    """A surface whose normals face the ray, as many ray casters answer."""
+
+    def __init__(self, surface):
+        self.surface = surface
+
+    def ray_cast(self, origin, direction, distance):
+        hit = self.surface.ray_cast(origin, direction, distance)
+        return hit and (hit[0], -math.copysign(1.0, np.dot(hit[1], direction)) * np.array(hit[1]))
+
+
+@pytest.mark.parametrize(
+    ("levels", "off"),
+    [
+        ([(0.3, 1.0)], 0.3),
+        ([(-0.3, 1.0)], 0.3),
+        ([(0.003, 1.0), (-0.017, -1.0)], 0.003),  # a thin plate below its patch
+        ([(0.3, 1.0), (0.25, -1.0), (0.02, 1.0), (-0.1, -1.0)], 0.02),  # a roof above it
+        ([(0.3, 1.0), (0.25, -1.0), (-0.02, 1.0), (-0.1, -1.0)], 0.02),
+        ([(-0.02, 1.0), (-0.04, -1.0), (-0.06, 1.0), (-0.5, -1.0)], 0.02),  # a slot in it
+        ([(1.5, 1.0)], None),
+    ],
+)
+def test_normals_that_face_the_ray_tell_the_same_distance(flat, levels, off):
+    for surface in (Levels(*levels), Facing(Levels(*levels))):
+        found = core.mesh_error(flat, surface).height
+        assert found is None if off is None else found == pytest.approx(off, abs=1e-6)
+
+
+def around(nearest, radius):
+    """The surface at a distance from what `nearest` maps x, y, z to the nearest point of."""
+
+    def off(x, y, z):
+        return [p - q for p, q in zip((x, y, z), nearest(x, y, z), strict=True)]
+
+    return surfaces.Exact(
+        lambda x, y, z: np.sqrt(sum(d * d for d in off(x, y, z))) - radius,
+        lambda p: np.array(off(*p)),
+        None,
+        math.nan,
+        math.nan,
+    )
+
+
+def on_arc(x, y, z):
+    """The nearest point of an arc around the z axis."""
+    turn = np.clip(np.arctan2(y, x), -1.2, 1.2)
+    return 40.0 * np.cos(turn), 40.0 * np.sin(turn), 0.0 * z
+
+
+def in_block(x, y, z):
+    """The nearest point of a block."""
+    return np.clip(x, -17.0, 17.0), np.clip(y, -11.0, 11.0), np.clip(z, -7.0, 7.0)
+
+
+@pytest.mark.parametrize(
+    ("surface", "size"),
+    [
+        (surfaces.torus(40, 20, 0.6), 60.0),
+        (surfaces.ellipsoid(35, 25, 20), 35.0),
+        (around(on_arc, 6.0), 46.0),
+        (around(in_block, 3.0), 20.0),
+    ],
+    ids=["torus", "egg", "banana", "rounded block"],
+)
+def test_touches_are_the_same_where_normals_face_the_ray(surface, size):
+    rng, hits = np.random.default_rng(3), []
+    while len(hits) < 25:
+        start, aim = rng.normal(size=3), rng.uniform(-0.8, 0.8, 3) * size
+        start *= 3.0 * size / np.linalg.norm(start)
+        hits.append(surface.ray_cast(start, (aim - start) / np.linalg.norm(aim - start), 6.0 * size))
+        hits = list(filter(None, hits))
+    points, normals = np.array(hits).transpose(1, 0, 2)
+    one, other = (
+        core.explore_many(each, points, normals, farthest=size) for each in (surface, Facing(surface))
+    )
+    assert sum(e.result.status == "ok" for e in other) >= 24
+    assert [(e.extent, e.result.status, e.result.taps) for e in other] == [
+        (e.extent, e.result.status, e.result.taps) for e in one
+    ]
+
+
+def test_whole_objects_are_the_same_where_normals_face_the_ray():
+    for solid in (solids.block(), solids.egg()):
+        one, other = (
+            core.explore_object(each, solid.start, solid.outward, tolerance=0.02, rng=0)
+            for each in (solid, Facing(solid))
+        )
+        assert (other.status, len(other.patches)) == ("ok", len(one.patches))
+        assert np.abs(solid.distances(other.mesh(0.15).vertices)).max() < 0.01
 
 
 class HalfPlane(Levels):
