@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, many
-from ..bayes.joint_fit import posterior_of
+from ..bayes.bends import Bends, bends_of
+from ..bayes.joint_fit import MISFIT, posterior_of
 from ..bayes.normals import contradiction, measured_normals, scatter
 from ..bayes.other_curves import contradicting_curve
 from ..bayes.posterior import SurfacePosterior, terms_to
 from ..bayes.prior import FREE
+from ..bayes.roughness import EXPLAINED_TERMS
 from ..contours.contour import Contour, read_only
 from ..contours.curves import (
     Curves,
@@ -34,6 +36,7 @@ from .status import Taps, contradicted, doubt, notes
 NEAR_POINT = 0.6  # This share of a process's deviation is left at the point (benchmarks.real).
 # The mesh is off the patch by at most this share of mean_height_std (benchmarks.patch_mesh).
 MESH_SHARE = 0.6
+MISFIT_SHARE = 0.6  # Of MISFIT, the curvatures have this share (benchmarks.curvatures: exact, noise 0).
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,26 +217,47 @@ class Reconstruction:
         """The outward unit normal at the point, (3,)."""
         return self.frame.axes[:, 2]
 
+    @cached_property
+    def curvature_covariance(self) -> Array:
+        """The covariance of the coefficients of x^2, xy and y^2, (3, 3), in unit radius.
+
+        A fit without a process takes the errors of contacts for independent, which those that share a bend
+        are not, and expects MISFIT of all surfaces, of which only a share is at the point.
+        """
+        fitted = self.posterior.covariance[2:FREE, 2:FREE]
+        polynomial = self.posterior.sextic or self.posterior
+        if polynomial.amplitude:
+            return fitted + self.bends.covariance
+        off = polynomial.residuals(self.contacts / self.radius)
+        left = max(float(off @ off) / max(len(off) - EXPLAINED_TERMS, 1), self.noise**2)
+        share = min((left + (MISFIT_SHARE * MISFIT) ** 2) / float(polynomial.noise) ** 2, 1.0)
+        return share * self.bends.contacts**2 * fitted + self.bends.covariance
+
+    @cached_property
+    def bends(self) -> Bends:
+        """How unevenly the surface bends along the curves."""
+        return bends_of(self.contours, self.frame, self.radius)
+
     @property
     def k1_std(self) -> float:
         """Standard deviation of the principal curvature k1, in 1/length."""
-        return 2.0 * math.sqrt(self.posterior.covariance[2, 2]) / self.radius
+        return 2.0 * math.sqrt(self.curvature_covariance[0, 0]) / self.radius
 
     @property
     def k2_std(self) -> float:
         """Standard deviation of the principal curvature k2, in 1/length."""
-        return 2.0 * math.sqrt(self.posterior.covariance[4, 4]) / self.radius
+        return 2.0 * math.sqrt(self.curvature_covariance[2, 2]) / self.radius
 
     @property
     def mean_curvature_std(self) -> float:
         """Standard deviation of H at the point, in 1/length."""
-        c = self.posterior.covariance
-        return math.sqrt(c[2, 2] + 2.0 * c[2, 4] + c[4, 4]) / self.radius
+        c = self.curvature_covariance
+        return math.sqrt(c[0, 0] + 2.0 * c[0, 2] + c[2, 2]) / self.radius
 
     @property
     def gaussian_curvature_std(self) -> float:
         """Standard deviation of K at the point, in 1/length^2, for normally distributed k1 and k2."""
-        c = 4.0 * self.posterior.covariance[2:FREE:2, 2:FREE:2]
+        c = 4.0 * self.curvature_covariance[::2, ::2]
         k = self.radius * np.array([self.patch.k2, self.patch.k1])
         return math.sqrt(k @ c @ k + c[0, 0] * c[1, 1] + c[0, 1] ** 2) / self.radius**2
 

@@ -20,6 +20,9 @@ DOUBTFUL_CONDITION = 1e3  # The factor by which plain least squares amplifies no
 DOUBTFUL_TURN = math.radians(10.0)  # Angle by which the frame may be off.
 LIKELY = 0.5  # Probability of that angle on a rough surface, whose directions differ at each scale.
 DOUBTFUL_CURVATURE = 0.1  # Deviation of a curvature times the radius: that of curves a quarter as long.
+DOUBTFUL_BENDS = (
+    0.16  # The same for want of bends (benchmarks.curvatures: folds; benchmarks.real --only automatic).
+)
 DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve may miss the point, if it is
 OWN_POINT = 1e-6  # A contact that is nearer to the point, in unit radius, is the point.
 SIGNIFICANT = 5.0  # this many standard deviations as well.
@@ -227,16 +230,19 @@ def _about_curves(r: Judged) -> Iterator[str]:
 
 
 def _about_bends(r: Judged) -> Iterator[str]:
-    """Whether the curvature on a flat face is that of the bends next to it."""
-    is_bent = any(
-        abs(k) > max(BENT / r.radius, BENT_DEVIATIONS * std)
-        for k, std in ((r.k1, r.k1_std), (r.k2, r.k2_std))
-    )
-    if is_bent and _flat_share(r) > FLAT:
+    """Whether the curvature is that of few bends: of folds, of facets, or of what is next to a flat face."""
+    bent = r.radius * max(abs(r.k1), abs(r.k2))
+    if bent > max(BENT, BENT_DEVIATIONS * r.posterior.curvature_std()) and _flat_share(r) > FLAT:
         advice = "move the point away from them"
         yield (
             "The point is on a flat face, and the curvature is that of the bends next to it: "
             f"{advice if _has_tried_shorter(r) else 'use a shorter extent or ' + advice}."
+        )
+    if r.bends.std > DOUBTFUL_BENDS:
+        advice = "move the point away from folds" if _has_tried_shorter(r) else "use a shorter extent"
+        yield (
+            "The surface bends at so few places along the curves, as at folds or facets, that curvatures are "
+            f"accurate to only {100.0 * r.bends.std:.0f} % of 1 / radius: {advice}, or make the facets finer."
         )
 
 
