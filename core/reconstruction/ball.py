@@ -51,6 +51,8 @@ def contacts_below(
     Strokes beyond its domain are left out. Raises DegenerateCurvesError where the ball is too large for the
     surface.
     """
+    for contour in contours:
+        _require_reached(centers, contour)
     # The centers bend as about an edge.
     if centers.patch.k1 - centers.k1_std < -1.0 / ball:
         raise DegenerateCurvesError(
@@ -58,8 +60,6 @@ def contacts_below(
             f"radius {ball:g} do on an edge, which may be sharper than the ball resolves: use a smaller ball "
             "or another point"
         )
-    for contour in contours:
-        _require_reached(centers, contour)
     inside = (
         stroke.part(centers.domain.contains(*centers.frame.to_local(stroke.points).T[:2]), stroke.stops)
         for stroke in strokes

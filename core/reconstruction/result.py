@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, many
 from ..bayes.bends import Bends, bends_of
-from ..bayes.joint_fit import MISFIT, posterior_of
+from ..bayes.joint_fit import MISFIT, OUTLYING, posterior_of
 from ..bayes.normals import contradiction, measured_normals, scatter
 from ..bayes.other_curves import contradicting_curve
 from ..bayes.posterior import SurfacePosterior, terms_to
@@ -49,8 +49,8 @@ class Reconstruction:
     strokes : the other fitted contacts, in the world, (n, 3); means of neighbors if there are many
     noise : noise floor, the standard deviation that a contact has at least, in units of L
     method : the method of the fit
-    point : (3,), the reference point, if it was touched or has a given deviation; None where contacts show it
-    point_std : its standard deviation along the normal, in units of L; 1 where contacts show it
+    point : (3,), the reference point as it was given
+    point_std : its standard deviation along the normal, in units of L; 1 where only contacts show the surface
     converged : whether its solver converged
     taps : what was felt between the curves; None if nobody tapped there
     known_height_std : mean_height_std, if it is known already
@@ -65,7 +65,7 @@ class Reconstruction:
     contours: tuple[Contour, ...]
     noise: float
     method: str
-    point: Array | None = None
+    point: Array
     point_std: float = 0.0
     converged: bool = True
     strokes: Array = field(default_factory=lambda: np.empty((0, 3)))
@@ -75,8 +75,7 @@ class Reconstruction:
 
     def __post_init__(self) -> None:
         copies = tuple(contour.copied() for contour in self.contours)
-        point = None if self.point is None else read_only(self.point)
-        vars(self).update(contours=copies, strokes=read_only(self.strokes), point=point)
+        vars(self).update(contours=copies, strokes=read_only(self.strokes), point=read_only(self.point))
 
     def __repr__(self) -> str:
         point = ", ".join(f"{x:.4g}" for x in self.frame.origin)
@@ -120,7 +119,7 @@ class Reconstruction:
     @property
     def _meeting(self) -> Array:
         """The place (3,) where curves meet: the reference point or, where contacts show it, the origin."""
-        return self.frame.origin if self.point is None else self.point
+        return self.point if self.point_std < 1.0 else self.frame.origin
 
     @cached_property
     def misses(self) -> Array:
@@ -236,7 +235,15 @@ class Reconstruction:
     @cached_property
     def bends(self) -> Bends:
         """How unevenly the surface bends along the curves."""
-        return bends_of(self.contours, self.frame, self.radius)
+        fitted = float(self.posterior.noise)
+        noises = [fitted if c.noise is None else c.noise / self.radius for c in self.contours]
+        explained = (self._explained(c, OUTLYING * fitted * self.radius) for c in self.contours)
+        return bends_of(tuple(explained), self.frame, self.radius, max(noises, default=0.0))
+
+    def _explained(self, contour: Contour, most: float) -> Contour:
+        """A contour, without those contacts that are off the surface by more than this length."""
+        x, y, z = self.frame.to_local(contour.points).T
+        return contour.part(np.abs(self.height(x, y) - z) <= most, contour.stops)
 
     @property
     def k1_std(self) -> float:
@@ -317,15 +324,14 @@ class Reconstruction:
         Raises ValueError for any other matrix.
         """
         scale, turn, shift = similarity(matrix)
-        start = self._meeting
-        end = scale * turn @ start + shift
+        start, end = self.point, scale * turn @ self.point + shift
         return replace(
             self,
             geometry=self.geometry.moved(matrix),
             patch=self.patch.scaled(scale),
             contours=tuple(contour.moved(scale, turn, start, end) for contour in self.contours),
             strokes=end + scale * (self.strokes - start) @ turn.T,
-            point=None if self.point is None else end,
+            point=end,
             known_height_std=None,
             known_curves=None,
         )

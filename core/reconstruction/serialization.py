@@ -41,7 +41,7 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
         "message": r.message,
         "converged": r.converged,
         "noise": r.noise,
-        "point": None if r.point is None else r.point.tolist(),
+        "point": r.point.tolist(),
         "point_std": r.point_std,
         "mean_height_std": r.mean_height_std,
         "geometry": {
@@ -83,14 +83,14 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
     method, strokes, patch = _of(d, "method"), _of(d, "strokes"), _polynomial(_of(d, "patch"))
     if not isinstance(method, str) or method not in METHODS:
         raise ValueError(f"method: expected one of {', '.join(METHODS)}, got {shown(method)}")
-    point, surface = _of(d, "point"), _posterior(_of(d, "posterior")) if method == "bayes" else None
+    surface = _posterior(_of(d, "posterior")) if method == "bayes" else None
     r = Reconstruction(
         geometry=_geometry(_of(d, "geometry"), surface or patch),
         patch=patch,
         contours=_contours(_of(d, "contours"), may_be_none=strokes is not None),
         noise=number("noise", _of(d, "noise"), least=0.0),
         method=method,
-        point=None if point is None else finite_array("point", point, (3,), LARGEST),
+        point=finite_array("point", _of(d, "point"), (3,), LARGEST),
         point_std=number("point_std", _of(d, "point_std"), least=0.0),
         converged=_converged(_of(d, "converged")),
         strokes=np.empty((0, 3)) if strokes is None else finite_array("strokes", strokes, (None, 3), LARGEST),

@@ -82,7 +82,8 @@ def _with_processes(start: Start, fit: _Fit, posteriors: SurfacePosterior, weigh
     """The joint fit in unit radius; where evidence favors a process, with it and in its frame."""
     points, axes, radii, contacts = fit[:4]
     offset = (weights * posteriors.residuals(contacts)).sum(axis=1) / weights.sum(axis=1)
-    offset *= offset_share(weights, start.point_stds / np.maximum(start.stds, MISFIT * start.radii))
+    given = _observations(start, axes, start.radii, contacts)
+    offset *= offset_share(weights, given.point_std / np.maximum(given.noise, MISFIT))
     contacts[..., 2] -= offset[:, None]
     points = points + (radii * offset)[:, None] * axes[..., 2]
     # The radius is the distance of the farthest contact of curves, or of strokes where there are no curves.
@@ -108,7 +109,7 @@ def _observations(start: Start, axes: Array, radii: Array, contacts: Array) -> O
         of_curves = (start.curves.normals @ axes[:, None]).reshape(len(contacts), -1, 3)
         normals[:, : of_curves.shape[1]] = of_curves
     tangent = (start.tangents[:, None] @ axes)[:, 0]
-    stds, point_stds = start.stds / radii, start.point_stds / radii
+    stds, point_stds = start.stds / radii, np.minimum(start.point_stds / radii, 1.0)
     return Observations(contacts, normals, tangent, stds, start.stds_are_known, point_stds)
 
 
@@ -136,18 +137,18 @@ def _result(
         surface: HeightField = patch.scaled(1.0 / scale)
     else:
         surface, patch = fit.posteriors[i], fit.posteriors[i].patch(fit.degrees[i]).scaled(scale)
-    is_known = bool(start.point_stds[i] < start.radii[i])
+    point_std = min(float(start.point_stds[i] / fit.radii[i]), 1.0)
     return Reconstruction(
         Geometry(frame, scale, surface, domain.scaled(scale)),
         patch,
         tuple(contours),
         noise=float(start.stds[i] / fit.radii[i]),
-        point_std=float(start.point_stds[i] / fit.radii[i]),
+        point_std=point_std,
         method=options.method,
         converged=converged,
         strokes=frame.to_world(scale * strokes),
-        point=start.points[i] if is_known else None,
-        known_curves=start.curves.at([i]) if is_known else None,
+        point=start.points[i],
+        known_curves=start.curves.at([i]) if point_std < 1.0 else None,
     )
 
 

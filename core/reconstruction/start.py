@@ -66,7 +66,7 @@ class Start(NamedTuple):
     strokes: list[Array]  # (m, 3) each, in the axes and in unit radius
     stds: Array  # (b,)
     stds_are_known: NDArray[np.bool_]  # (b,), to be all of the noise; of means it is more
-    point_stds: Array  # (b,), of the points along the normal; the radius where contacts alone show it
+    point_stds: Array  # (b,), of the points along the normal; infinite where only contacts show the surface
 
     @property
     def strokes_only(self) -> bool:
@@ -193,7 +193,7 @@ def _point_std(point: Array, contours: Sequence[Contour], options: FitOptions, r
     if options.point_std is not None:
         return options.point_std
     if all(distances_from_point(contour.points - point)[1].all() for contour in contours):
-        return radius
+        return math.inf
     noises = [options.noise] if options.noise is not None else [contour.noise for contour in contours]
     return max((MISFIT * radius if noise is None else noise) for noise in noises)
 
@@ -256,7 +256,7 @@ def strokes_start(
         strokes=[contacts for contacts, _ in thin],
         stds=np.array([_std(noise, size, [given[i].noise / math.sqrt(size)]) for i, size in sizes]),
         stds_are_known=np.zeros(len(good), dtype=bool),
-        point_stds=np.array([first.radius for first in firsts.values()]),
+        point_stds=np.full(len(good), np.inf),
     )
     return start, none, errors
 

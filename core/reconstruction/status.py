@@ -20,9 +20,7 @@ DOUBTFUL_CONDITION = 1e3  # The factor by which plain least squares amplifies no
 DOUBTFUL_TURN = math.radians(10.0)  # Angle by which the frame may be off.
 LIKELY = 0.5  # Probability of that angle on a rough surface, whose directions differ at each scale.
 DOUBTFUL_CURVATURE = 0.1  # Deviation of a curvature times the radius: that of curves a quarter as long.
-DOUBTFUL_BENDS = (
-    0.16  # The same for want of bends (benchmarks.curvatures: folds; benchmarks.real --only automatic).
-)
+DOUBTFUL_BENDS = 0.27  # The same, for want of bends (benchmarks.curvatures: folds).
 DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve may miss the point, if it is
 OWN_POINT = 1e-6  # A contact that is nearer to the point, in unit radius, is the point.
 SIGNIFICANT = 5.0  # this many standard deviations as well.
@@ -138,12 +136,12 @@ def _about_point(r: Judged) -> Iterator[str]:
     """Whether curves miss the point, which makes everything else doubtful, too."""
     distances, stds = r.misses.T / r.radius
     stds = np.maximum(stds, LEAST_SCATTER * r.noise)
-    stds = stds if r.point is None else np.hypot(stds, r.point_std)
+    stds = np.hypot(stds, r.point_std) if r.point_std < 1.0 else stds
     apart = distances > np.maximum(DOUBTFUL_MISS, SIGNIFICANT * stds)
     if apart.any():
         worst = np.argmax(np.where(apart, distances, 0.0))
         # If the point is one of its contacts, the fit to these is off.
-        if r.point is not None and r.contours[worst].distance_to(r.point) <= OWN_POINT * r.radius:
+        if r.contours[worst].distance_to(r.point) <= OWN_POINT * r.radius:
             yield (
                 f"Curve {worst + 1} bends so sharply at the point that its fit is "
                 f"{100.0 * distances[worst]:.2g} % of the radius off there: move the point away from edges, "

@@ -32,7 +32,7 @@ def read(path: str | Path) -> Contacts:
 
 def contacts_of(r: core.Reconstruction) -> Contacts:
     """The Contacts that a reconstruction was fitted to; fitting them gives the same reconstruction."""
-    noise, (origin, normal) = r.noise * r.radius, (r.frame.origin, r.frame.axes[:, 2])
+    noise, (origin, normal) = r.noise * r.radius, (r.point, r.frame.axes[:, 2])
     contours = [replace(contour, noise=noise) for contour in r.contours]
     strokes = (core.Contour(r.strokes, noise=noise),) if len(r.strokes) else ()
     return Contacts(contours, "", origin.tolist(), normal.tolist(), strokes)

@@ -31,7 +31,7 @@ def _put(probe: Object, touched: Touched) -> None:
     """
     if probe.constraints:
         return
-    location, (e1, n, across) = touched.result.frame.origin, np.transpose(touched.report["axes"])
+    location, (e1, n, across) = touched.result.point, np.transpose(touched.report["axes"])
     turn = Matrix(np.column_stack([e1, -across, n]).tolist())
     wanted = Matrix.LocRotScale(location.tolist(), turn.to_quaternion(), None)
     old, new = (np.array(m, dtype=float) for m in (probe.matrix_world.normalized(), wanted))

@@ -124,7 +124,7 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
 
     def _take(self, context: bpy.types.Context) -> Outcome:
         touched = self._seen["touched"]
-        self.target, self.location = touched.report["source"], touched.result.frame.origin
+        self.target, self.location = touched.report["source"], touched.result.point
         self.outward = touched.result.frame.axes[:, 2]
         return self.execute(context)
 

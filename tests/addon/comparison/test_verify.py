@@ -319,7 +319,7 @@ def with_no_faces(bpy, patch):
         (with_empty, '"Nothing" is not a mesh'),
         (with_no_faces, '"Bare" has no faces'),
         (several, "2 meshes are selected: select one besides the patch"),
-        (of_a_later_version, "can no longer be read: touch again .version: expected 3, got 4"),
+        (of_a_later_version, "can no longer be read: touch again .version: expected 4, got 5"),
         (scaled(1.0, 2.0, 1.0), "is stretched, mirrored or has a scale of 0"),
         (scaled(-1.0, 1.0, 1.0), "is stretched, mirrored or has a scale of 0"),
         (scaled(-1.0, -1.0, -1.0), "is stretched, mirrored or has a scale of 0"),
