@@ -13,16 +13,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arguments import Array
-from ..contours.contour import Contour, unit_normals
+from ..arguments import SMALLEST, Array
+from ..contours.contour import Contour
 from ..contours.local_geometry import Frame
 from ..patch.monge import TERMS, monomials
-from .posterior import largest_curvature_std
 from .prior import FREE
 
-# M bends show the mean curvature of a curve to the share (FEW_BENDS / M)^3 (benchmarks.curvatures: folds).
-FEW_BENDS = 3.5
-EXPLAINED = 4.0  # Turns that are off the median by fewer deviations are explained by noise.
+# M bends, or two if there are fewer, show the mean curvature of a curve to the share (FEW / M)^3. Fewer than
+# FEW are those of folds or facets (benchmarks.curvatures: folds; a cylinder of 24 facets has more).
+FEW = 3.0
+EXPLAINED = 5.0  # Turns that are off the median by fewer deviations are explained by noise.
 CHORDS = 24  # A curve without normals has at most this number of chords, as a touch has steps.
 FLAT = 1e-6  # A curve whose normals turn by less, in radians, turns by rounding.
 
@@ -32,28 +32,12 @@ class Bends(NamedTuple):
 
     covariance : (3, 3), of the coefficients of x^2, xy and y^2 in unit radius, for want of bends
     contacts : how many contacts share a bend, 1 or more
+    folded : the largest mean curvature of a curve of fewer than FEW bends, in unit radius
     """
 
     covariance: Array
     contacts: float
-
-    @property
-    def std(self) -> float:
-        """The largest deviation of a normal curvature for want of bends, in unit radius."""
-        return largest_curvature_std(self.covariance)
-
-
-class _Turns(NamedTuple):
-    """A curve's direction (x, y) in the tangent plane, its length in unit radius, and its turns (n,).
-
-    is_felt : whether these are turns of normals, which are the same all over a facet
-    """
-
-    x: float
-    y: float
-    length: float
-    turns: Array
-    is_felt: bool
+    folded: float
 
 
 def bends_of(contours: Sequence[Contour], frame: Frame, radius: float, noise: float) -> Bends:
@@ -61,56 +45,74 @@ def bends_of(contours: Sequence[Contour], frame: Frame, radius: float, noise: fl
 
     noise : of a contact without normals, in unit radius
 
-    Along a curve, turns d from contact to contact count as M = (sum |d|)^2 / sum d^2 bends: as many as there
-    are turns if all are equal, and one if there is a single one. Turns that noise explains count as equal.
+    Along a curve, the surface turns by d over each step h from contact to contact. With H = sum h these count
+    as M = n (sum |d|)^2 / (H sum d^2 / h) bends: n if the turns of the n steps are as their lengths, and one if
+    there is a single one of n even steps. Turns that noise explains count as even.
     """
-    of_each = (_turns(contour, frame, radius, noise) for contour in contours)
-    each = [_uneven(of) for of in of_each if of is not None]
-    x, y, turned, stds, contacts = np.array(each).reshape(-1, 5).T
+    each = [_bends(*turns) for contour in contours if (turns := _turns(contour, frame, radius, noise))]
+    x, y, turned, shares, bent, contacts = np.array(each).reshape(-1, 6).T
     if not turned.any():
-        return Bends(np.zeros((3, 3)), 1.0)
+        return Bends(np.zeros((3, 3)), 1.0, 0.0)
     inverse = np.linalg.pinv(2.0 * monomials(np.column_stack([x, y]), TERMS[2:FREE]))
-    return Bends((inverse * stds**2) @ inverse.T, float(np.average(contacts, weights=turned)))
+    covariance = (inverse * (shares * bent) ** 2) @ inverse.T
+    contacts = float(turned @ contacts / turned.sum())
+    return Bends(covariance, contacts, float(bent[shares > 1.0].max(initial=0.0)))
 
 
-def _turns(contour: Contour, frame: Frame, radius: float, noise: float) -> _Turns | None:
-    """The turns along one contour, or None if it is too short to have any."""
+def _turns(
+    contour: Contour, frame: Frame, radius: float, noise: float
+) -> tuple[float, float, Array, Array, bool] | None:
+    """A curve's direction (x, y) in the tangent plane, its steps h (n,), and turns d (n,).
+
+    Also whether these are turns of normals, which are the same all over a facet. It is None for less than
+    three contacts, or contacts in one place.
+    """
     local = frame.to_local(contour.points) / radius
     reach = np.hypot(local[:, 0], local[:, 1])
     if len(local) < 3 or reach.max() == 0.0:
         return None
-    x, y = (local[np.argmax(reach), :2] / reach.max()).tolist()
-    along = local[:, :2] @ (x, y)
-    order = np.argsort(along, kind="stable")
+    x, y = (local[reach.argmax(), :2] / reach.max()).tolist()
+    along = local[:, 0] * x + local[:, 1] * y
+    order = along.argsort(kind="stable")
+    along = along[order]
     if contour.normals is None:
-        turns, std = _turns_of_chords(along[order], local[order, 2], noise)
-    else:
-        normals = (unit_normals(contour.normals) @ frame.axes)[order]
-        # Normals may be those of either side.
-        angles = np.unwrap(np.arctan2(normals[:, :2] @ (x, y), normals[:, 2]), period=np.pi)
-        # One contact alone that turns another way and back is an outlier.
-        angles[1:-1] = np.median([angles[:-2], angles[1:-1], angles[2:]], axis=0)
-        turns = np.diff(angles)
-        std = np.full(len(turns), math.sqrt(2.0) * (contour.normal_std or 0.0))
-    even = np.abs(turns - np.median(turns)) <= EXPLAINED * std
-    turns[even] = turns[even].mean() if even.any() else 0.0
-    return _Turns(x, y, float(np.ptp(along)), turns, contour.normals is not None)
+        return (x, y, *_turns_of_chords(along, local[order, 2], noise), False)
+    normals = contour.normals[order] @ frame.axes
+    # Normals may be of any length, and those of either side.
+    across = normals[:, 0] * x + normals[:, 1] * y
+    angles = np.arctan2(np.copysign(1.0, normals[:, 2]) * across, np.abs(normals[:, 2]))
+    # One contact alone that turns another way and back is an outlier.
+    before, at, after = angles[:-2], angles[1:-1], angles[2:]
+    angles[1:-1] = np.maximum(np.minimum(before, at), np.minimum(np.maximum(before, at), after))
+    steps, std = np.diff(along), math.sqrt(2.0) * (contour.normal_std or 0.0)
+    return x, y, steps, _evened(np.diff(angles), steps, np.array(std)), True
 
 
 def _turns_of_chords(along: Array, heights: Array, noise: float) -> tuple[Array, Array]:
-    """The turns (m,) from chord to chord of contacts (n,) along a curve, and their deviations (m,)."""
+    """Steps (n,) between the middles of chords of a curve, and its turns (n,) from chord to chord."""
     chosen = np.unique(np.linspace(0, len(along) - 1, CHORDS + 1).round().astype(np.intp))
-    steps = np.maximum(np.diff(along[chosen]), 1e-300)
-    angles = np.arctan2(np.diff(heights[chosen]), steps)
-    return np.diff(angles), noise * math.sqrt(6.0) / np.minimum(steps[1:], steps[:-1])
+    lengths = np.maximum(np.diff(along[chosen]), SMALLEST)
+    turns = np.diff(np.arctan2(np.diff(heights[chosen]), lengths))
+    steps = 0.5 * (lengths[1:] + lengths[:-1])
+    return steps, _evened(turns, steps, noise * math.sqrt(6.0) / np.minimum(lengths[1:], lengths[:-1]))
 
 
-def _uneven(of: _Turns) -> tuple[float, float, float, float, float]:
-    """x, y, the sum of turns, the deviation of the curvature for want of bends, and contacts in a bend."""
-    turned, most = float(np.abs(of.turns).sum()), len(of.turns)
+def _evened(turns: Array, steps: Array, stds: Array) -> Array:
+    """The turns (n,) over steps (n,), of which those that their deviations explain follow the mean bend."""
+    if not stds.any():
+        return turns
+    even = np.abs(turns - np.median(turns)) <= EXPLAINED * stds
+    mean = turns[even].sum() / max(float(steps[even].sum()), SMALLEST)
+    return np.where(even, mean * steps, turns)
+
+
+def _bends(
+    x: float, y: float, steps: Array, turns: Array, is_felt: bool
+) -> tuple[float, float, float, float, float, float]:
+    """x, y, the sum of turns, the share to which they show the mean curvature, this, contacts in a bend."""
+    turned, most, length = float(np.abs(turns).sum()), len(turns), float(steps.sum())
     if turned <= FLAT:
-        return of.x, of.y, 0.0, 0.0, 1.0
-    bends = turned**2 / float(of.turns @ of.turns)
-    share = FEW_BENDS**3 * max(bends**-3 - most**-3, 0.0)
-    std = share * abs(float(of.turns.sum())) / of.length
-    return of.x, of.y, turned, std, most / bends if of.is_felt else 1.0
+        return x, y, 0.0, 0.0, 0.0, 1.0
+    bends = most * turned**2 / (length * float(turns @ (turns / np.maximum(steps, 1e-3 * length / most))))
+    share, bent = (FEW / max(bends, 2.0)) ** 3, abs(float(turns.sum())) / length
+    return x, y, turned, share, bent, max(most / bends, 1.0) if is_felt else 1.0

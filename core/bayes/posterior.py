@@ -256,20 +256,15 @@ class SurfacePosterior(HeightField):
 
     def curvature_std(self) -> float:
         """Standard deviation of the normal curvature at the origin, in the direction where it is largest."""
-        return largest_curvature_std(self.covariance[2:FREE, 2:FREE])
+        bent = _bent()
+        variances = np.einsum("ni,ni->n", bent @ self.covariance[2:FREE, 2:FREE], bent)
+        return math.sqrt(max(float(variances.max()), 0.0))
 
     def null_space_dimension(self, degree: int) -> int:
         """How many directions among the terms of degree 1 to `degree` keep 90 % of their prior variance."""
         last = terms_to(degree) - FREE
         singular = np.linalg.svd(self.visibility[:last, :last], compute_uv=False)
         return int(np.count_nonzero(INVISIBLE * (1.0 + singular**2) < 1.0))
-
-
-def largest_curvature_std(covariance: Array) -> float:
-    """The largest deviation of a normal curvature, given the covariance (3, 3) of x^2, xy and y^2."""
-    bent = _bent()
-    variances = np.einsum("ni,ni->n", bent @ covariance, bent)
-    return math.sqrt(max(float(variances.max()), 0.0))
 
 
 def terms_to(degree: int) -> int:

@@ -125,8 +125,9 @@ def posterior_given(mean: Array, data: Sextics, hyper: Hyperparameters) -> Surfa
     # Waviness and noise are estimates, so deviations are those of a Student t of this freedom.
     freedom = np.maximum(data.counts - FREE, LEAST_FREEDOM)
     root *= np.sqrt(freedom / (freedom - 2.0))[:, None, None]
-    root[:, :-1, -1] = -(root[:, :-1, :-1] @ data.pivot[..., None])[..., 0]
-    root[:, -1, -1] = hyper.noise * np.sqrt(data.offset)
+    if data.offset.any():
+        root[:, :-1, -1] = -(root[:, :-1, :-1] @ data.pivot[..., None])[..., 0]
+        root[:, -1, -1] = hyper.noise * np.sqrt(data.offset)
     return SurfacePosterior(mean, root, hyper.noise, visibility)
 
 

@@ -59,8 +59,8 @@ def reconstruct(
     degree : d of (1), 2 to 6, or "auto", the lowest that describes what the contacts show
     noise : noise floor, the standard deviation that a contact has at least; None for the contours' own
     point_std : standard deviation of the point along the normal, a length: 0 if it is exact. If it is None,
-        a point that is a contact of every curve has their noise, and any other is only a place: "bayes" has
-        the origin where contacts show the surface below it
+        a point that is a contact of a curve has its noise, and any other is only a place: "bayes" has the
+        origin where contacts show the surface, on the normal through it
     weight : lambda L^2 of "tagc" and "quadratic-variation", None for 1000 and 1e5
     solver : for "tagc", "fast" (Newton, from the quadric) or "descent" (the paper's, from its start)
 

@@ -11,12 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, many
 from ..bayes.bends import Bends, bends_of
-from ..bayes.joint_fit import MISFIT, OUTLYING, posterior_of
+from ..bayes.joint_fit import OUTLYING, posterior_of
 from ..bayes.normals import contradiction, measured_normals, scatter
 from ..bayes.other_curves import contradicting_curve
-from ..bayes.posterior import SurfacePosterior, terms_to
+from ..bayes.posterior import SurfacePosterior, coefficients_of, terms_to
 from ..bayes.prior import FREE
-from ..bayes.roughness import EXPLAINED_TERMS
 from ..contours.contour import Contour, read_only
 from ..contours.curves import (
     Curves,
@@ -36,7 +35,6 @@ from .status import Taps, contradicted, doubt, notes
 NEAR_POINT = 0.6  # This share of a process's deviation is left at the point (benchmarks.real).
 # The mesh is off the patch by at most this share of mean_height_std (benchmarks.patch_mesh).
 MESH_SHARE = 0.6
-MISFIT_SHARE = 0.6  # Of MISFIT, the curvatures have this share (benchmarks.curvatures: exact, noise 0).
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,23 +219,23 @@ class Reconstruction:
         """The covariance of the coefficients of x^2, xy and y^2, (3, 3), in unit radius.
 
         A fit without a process takes the errors of contacts for independent, which those that share a bend
-        are not, and expects MISFIT of all surfaces, of which only a share is at the point.
+        are not. A patch by another method also departs from the posterior's mean.
         """
-        fitted = self.posterior.covariance[2:FREE, 2:FREE]
-        polynomial = self.posterior.sextic or self.posterior
-        if polynomial.amplitude:
-            return fitted + self.bends.covariance
-        off = polynomial.residuals(self.contacts / self.radius)
-        left = max(float(off @ off) / max(len(off) - EXPLAINED_TERMS, 1), self.noise**2)
-        share = min((left + (MISFIT_SHARE * MISFIT) ** 2) / float(polynomial.noise) ** 2, 1.0)
-        return share * self.bends.contacts**2 * fitted + self.bends.covariance
+        posterior, found = self.posterior, self.posterior.covariance[2:FREE, 2:FREE]
+        if not (posterior.sextic or posterior).amplitude:
+            found = self.bends.contacts**2 * found  # benchmarks.curvatures: scans, facets
+        if self.method != "bayes":
+            off = posterior.polynomial[2:FREE] - coefficients_of(self.patch.scaled(1.0 / self.radius))[2:FREE]
+            found = found + np.outer(off, off)
+        return found + self.bends.covariance
 
     @cached_property
     def bends(self) -> Bends:
         """How unevenly the surface bends along the curves."""
         fitted = float(self.posterior.noise)
         noises = [fitted if c.noise is None else c.noise / self.radius for c in self.contours]
-        explained = (self._explained(c, OUTLYING * fitted * self.radius) for c in self.contours)
+        most = OUTLYING * fitted * self.radius
+        explained = (self._explained(c, most) if c.normals is None else c for c in self.contours)
         return bends_of(tuple(explained), self.frame, self.radius, max(noises, default=0.0))
 
     def _explained(self, contour: Contour, most: float) -> Contour:

@@ -81,11 +81,13 @@ def _fit(start: Start, options: FitOptions) -> _Fit:
 def _with_processes(start: Start, fit: _Fit, posteriors: SurfacePosterior, weights: Array) -> _Fit:
     """The joint fit in unit radius; where evidence favors a process, with it and in its frame."""
     points, axes, radii, contacts = fit[:4]
-    offset = (weights * posteriors.residuals(contacts)).sum(axis=1) / weights.sum(axis=1)
-    given = _observations(start, axes, start.radii, contacts)
-    offset *= offset_share(weights, given.point_std / np.maximum(given.noise, MISFIT))
-    contacts[..., 2] -= offset[:, None]
-    points = points + (radii * offset)[:, None] * axes[..., 2]
+    offset = np.zeros(len(points))
+    if start.point_stds.any():
+        given = _observations(start, axes, start.radii, contacts)
+        offset = (weights * posteriors.residuals(contacts)).sum(axis=1) / weights.sum(axis=1)
+        offset *= offset_share(weights, given.point_std / np.maximum(given.noise, MISFIT))
+        contacts[..., 2] -= offset[:, None]
+        points = points + (radii * offset)[:, None] * axes[..., 2]
     # The radius is the distance of the farthest contact of curves, or of strokes where there are no curves.
     places = contacts.shape[1] if start.strokes_only else start.curves.present[0].size
     farthest = np.hypot(contacts[..., 0], contacts[..., 1])[:, :places].max(axis=1)
