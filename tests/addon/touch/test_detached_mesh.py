@@ -93,7 +93,7 @@ def test_a_touch_within_one_bent_facet_is_about_that_facet_on_a_map_too(empty, e
     """A face of Suzanne's ear has four corners that are not in a plane, and curvatures of its own."""
     empty.ops.mesh.primitive_monkey_add()
     obj, depsgraph = empty.context.object, empty.context.evaluated_depsgraph_get()
-    empty.ops.tactile.reconstruct(target=obj.name, location=(-1.1484375, 0.375, 0.4739583))
+    empty.ops.tactile.reconstruct(target=obj.name, location=(-1.1484375, 0.375, 0.4739583), extent=0.06)
     patch = empty.context.object
     assert patch["tactile"]["few_facets"]
     assert max(abs(patch["tactile"]["k1"]), abs(patch["tactile"]["k2"])) > 0.5

@@ -162,7 +162,8 @@ def test_the_contours_are_an_object_of_their_own(empty, ball):
     # Each contact is the middle of an octahedron, and the reference point is the eleventh contact.
     points = positions(lines.data)
     centers = points[contact >= 0].reshape(-1, 6, 3).mean(axis=1)
-    assert centers[10] == pytest.approx(0.0, abs=1e-6)
+    assert centers[10, :2] == pytest.approx(0.0, abs=1e-6)
+    assert abs(centers[10, 2]) < 0.01  # the noise
     world = np.array([tuple(patch.matrix_world @ Vector(c)) for c in centers])
     off = np.linalg.norm(world, axis=1) - RADIUS
     assert 0.005 < off.std() < 0.02
