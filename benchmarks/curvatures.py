@@ -5,8 +5,8 @@
 `python -m benchmarks.curvatures [--quick]`, from the root of a checkout; --quick takes a tenth of the
 touches. Scans need bpy. The command prints a Markdown table with a row for each kind of touch: of exact
 surfaces, random shapes, curves whose common point is found or given with an error (every other one on a
-ball), scans, and flat tops between two folds, where both curvatures are 0: with given extents, some with an
-automatic one.
+ball), scans, and flat tops between two folds, where both curvatures are 0: with given extents, with an
+automatic one, and without normals; and flat cones, beside their tips.
 
 The true curvatures of a scan are those of a polynomial fitted to many points of the mesh: of the quartic over
 0.6 of the radius, which a fit with a process states, or of the sextic over the domain, which it states
@@ -127,7 +127,7 @@ def found(seed, count, noise=None, errors=None):
     return surface, reconstruct(point, contours, outward=surface.normal)
 
 
-def fold(seed, angle, is_automatic=False):
+def fold(seed, angle, is_automatic=False, has_normals=True):
     """A flat top that falls off by this angle, in degrees, at both sides."""
     rng, slope = np.random.default_rng(seed), math.tan(math.radians(angle))
     surface = surfaces.Exact(
@@ -138,7 +138,22 @@ def fold(seed, angle, is_automatic=False):
     turn, extent = rng.uniform(0.0, math.pi), rng.uniform(0.4, 1.0)
     lengths = {"farthest": 1.5} if is_automatic else {"extent": extent}
     planes = [SamplingPlane(turn + math.pi * i / 3) for i in range(3)]
-    return surface, explore(surface, surface.point, surface.normal, planes, **lengths).result
+    r = explore(surface, surface.point, surface.normal, planes, **lengths).result
+    bare = [replace(contour, normals=None) for contour in r.contours]
+    return surface, r if has_normals else reconstruct(surface.point, bare, outward=surface.normal)
+
+
+def cone(seed):
+    """A flat cone, touched beside its tip with an automatic extent."""
+    rng = np.random.default_rng(seed)
+    slope, away, turn = rng.uniform(0.1, 0.7), rng.uniform(0.2, 0.9), rng.uniform(0.0, math.pi)
+    surface = surfaces.Exact(
+        lambda x, y, z: z + slope * np.hypot(x, y),
+        lambda p: np.array([*(slope * p[:2] / math.hypot(*p[:2])), 1.0]),
+        *(np.array([away, 0.0, -slope * away]), 0.0, 0.0),
+    )
+    planes = [SamplingPlane(turn + math.pi * i / 3) for i in range(3)]
+    return surface, explore(surface, surface.point, surface.normal, planes, farthest=2.0).result
 
 
 ROWS = {
@@ -149,10 +164,9 @@ ROWS = {
     **{f"found point, {n} contacts, told": partial(found, count=n, noise=NOISE) for n in (41, 400)},
     **{f"given point, {e[0]:g} and {e[1]:g} off": partial(found, count=41, errors=e) for e in ERRORS},
     **{f"folds of {angle} degrees": partial(fold, angle=angle) for angle in (5, 10, 15, 20)},
-    **{
-        f"folds of {angle} degrees, automatic": partial(fold, angle=angle, is_automatic=True)
-        for angle in (5, 20)
-    },
+    **{f"folds of {a} degrees, automatic": partial(fold, angle=a, is_automatic=True) for a in (5, 20)},
+    **{f"folds of {a} degrees, no normals": partial(fold, angle=a, has_normals=False) for a in (5, 10, 20)},
+    "beside the tip of a cone, automatic": cone,
 }
 
 
