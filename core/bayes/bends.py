@@ -55,8 +55,8 @@ def bends_of(contours: Sequence[Contour], frame: Frame, radius: float, noise: fl
         return Bends(np.zeros((3, 3)), 1.0, 0.0)
     inverse = np.linalg.pinv(2.0 * monomials(np.column_stack([x, y]), TERMS[2:FREE]))
     covariance = (inverse * (shares * bent) ** 2) @ inverse.T
-    contacts = float(turned @ contacts / turned.sum())
-    return Bends(covariance, contacts, float(bent[shares > 1.0].max(initial=0.0)))
+    folded = float(bent[shares > 1.0].max(initial=0.0))
+    return Bends(covariance, float(turned @ contacts / turned.sum()), folded)
 
 
 def _turns(
