@@ -12,7 +12,7 @@ from ..contours.contour import EXTENT, SURFACE_STOPS, UNEXPLAINED, Contour, Samp
 from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
-from ..reconstruction.status import DOUBTFUL_CURVATURE
+from ..reconstruction.status import DOUBTFUL_FOLD
 from .growth import MOST_STEPS, STRETCH, Answer, Counts, GrowthTrial, Request, Track, TrackedContours, grown
 from .options import ExplorationOptions
 from .sampling_density import CONTACT_COUNTS, MIN_HALF_CONTACTS, spacing, suffices
@@ -263,7 +263,7 @@ def _shorter_extents(found: Exploration) -> Iterator[float]:
     while extent > factor * LEAST_SHARE * found.extent:
         extent /= factor
         yield extent
-    while found.result.bends.folded > DOUBTFUL_CURVATURE and extent > SHORTER * FOLDED_SHARE * found.extent:
+    while found.result.bends.folded > DOUBTFUL_FOLD and extent > SHORTER * FOLDED_SHARE * found.extent:
         extent /= SHORTER
         yield extent
     ends = np.array([contour.points[[0, -1]] for contour in found.contours])

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..arguments import Array
 from ..bayes.posterior import coefficients_of
-from ..bayes.prior import FREE
 from ..patch.monge import PARTIALS, TERMS, derived_monomials, monomials
 from .result import Reconstruction
 
@@ -60,8 +59,7 @@ def gaussian_curvature_stds(r: Reconstruction, x: Array, y: Array) -> Array:
     the second-order variance of z_xx z_yy - z_xy^2 for normally distributed second derivatives.
     """
     by = derived_monomials(np.stack([x, y], axis=-1) / r.radius, TERMS, PARTIALS[1:])
-    derivatives, covariance = by @ r.posterior.polynomial, r.posterior.covariance.copy()
-    covariance[2:FREE, 2:FREE] = r.curvature_covariance
+    derivatives, covariance = by @ r.posterior.polynomial, r.posterior.covariance
     zx, zy, zxx, zxy, zyy = derivatives[:, :, None]
     steep = 1.0 + zx**2 + zy**2
     k = (zxx * zyy - zxy**2) / steep**2

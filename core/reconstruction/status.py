@@ -20,6 +20,9 @@ DOUBTFUL_CONDITION = 1e3  # The factor by which plain least squares amplifies no
 DOUBTFUL_TURN = math.radians(10.0)  # Angle by which the frame may be off.
 LIKELY = 0.5  # Probability of that angle on a rough surface, whose directions differ at each scale.
 DOUBTFUL_CURVATURE = 0.1  # Deviation of a curvature times the radius: that of curves a quarter as long.
+# Mean curvature times the radius of a curve of few bends (benchmarks.curvatures: folds of 20 degrees, automatic):
+# with less, a default cylinder is in doubt at its rim.
+DOUBTFUL_FOLD = 0.2
 DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve may miss the point, if it is
 OWN_POINT = 1e-6  # A contact that is nearer to the point, in unit radius, is the point.
 SIGNIFICANT = 5.0  # this many standard deviations as well.
@@ -235,7 +238,7 @@ def _about_bends(r: Judged) -> Iterator[str]:
             "The point is on a flat face, and the curvature is that of the bends next to it: "
             f"{advice if _has_tried_shorter(r) else 'use a shorter extent or ' + advice}."
         )
-    if r.bends.folded > DOUBTFUL_CURVATURE:
+    if r.bends.folded > DOUBTFUL_FOLD:
         advice = "move the point away from folds" if _has_tried_shorter(r) else "use a shorter extent"
         yield (
             "The surface turns at only one or two places along a curve, as at folds or facets, and the "
