@@ -12,7 +12,6 @@ from ..contours.contour import EXTENT, SURFACE_STOPS, UNEXPLAINED, Contour, Samp
 from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
-from ..reconstruction.status import DOUBTFUL_FOLD
 from .growth import MOST_STEPS, STRETCH, Answer, Counts, GrowthTrial, Request, Track, TrackedContours, grown
 from .options import ExplorationOptions
 from .sampling_density import CONTACT_COUNTS, MIN_HALF_CONTACTS, spacing, suffices
@@ -23,10 +22,7 @@ FINER = 8.0  # Steps are shorter by this factor if curves have too few contacts 
 SHORTER = 1.15  # Half curves next to a contradiction become shorter by this (benchmarks.real --only taps).
 # A touch in doubt becomes shorter by the same if taps contradict it, or else by this factor, at most to
 NEXT_EXTENT, LEAST_SHARE = 1.07, 0.25  # this share of its extent (benchmarks.real --only automatic),
-STRIP = 4.0  # unless this multiple of a strip's width is less,
-FOLDED_SHARE = (
-    0.03  # or where the surface has folds, to this share (benchmarks.curvatures: folds, automatic).
-)
+STRIP = 4.0  # unless this multiple of a strip's width is less.
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,18 +249,14 @@ class Touch:
 def _shorter_extents(found: Exploration) -> Iterator[float]:
     """Extents that shrink by a factor to LEAST_SHARE, and to the width of a strip that is narrower.
 
-    Across a strip most half curves are short, and show no curvature in units of a long patch. A face between
-    folds is as narrow. If taps contradict a touch, few extents are tried: of many, one may have no tap where
-    the contradiction is.
+    Across a strip most half curves are short, and show no curvature in units of a long patch. If taps
+    contradict a touch, few extents are tried: of many, one may have no tap where the contradiction is.
     """
     taps = found.result.taps
     factor = SHORTER if taps is not None and taps.off else NEXT_EXTENT
     origin, extent = found.result.frame.origin, found.extent
     while extent > factor * LEAST_SHARE * found.extent:
         extent /= factor
-        yield extent
-    while found.result.bends.folded > DOUBTFUL_FOLD and extent > SHORTER * FOLDED_SHARE * found.extent:
-        extent /= SHORTER
         yield extent
     ends = np.array([contour.points[[0, -1]] for contour in found.contours])
     width = float(np.median(np.linalg.norm(ends - origin, axis=2)))

@@ -20,8 +20,8 @@ DOUBTFUL_CONDITION = 1e3  # The factor by which plain least squares amplifies no
 DOUBTFUL_TURN = math.radians(10.0)  # Angle by which the frame may be off.
 LIKELY = 0.5  # Probability of that angle on a rough surface, whose directions differ at each scale.
 DOUBTFUL_CURVATURE = 0.1  # Deviation of a curvature times the radius: that of curves a quarter as long.
-# Mean curvature times the radius of a curve of few bends (benchmarks.curvatures: folds of 20 degrees, automatic):
-# with less, a default cylinder is in doubt at its rim.
+# Mean curvature times the radius of a curve of few bends (benchmarks.curvatures: folds of 15 and 20 degrees).
+# With less, a default cylinder is in doubt at its rim.
 DOUBTFUL_FOLD = 0.2
 DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve may miss the point, if it is
 OWN_POINT = 1e-6  # A contact that is nearer to the point, in unit radius, is the point.
