@@ -74,7 +74,7 @@ def test_the_labels_and_the_bar_say_the_range(extension):
 def test_a_mesh_file_can_be_touched(extension, scans, name):
     patch = demo.touch(extension, str(scans / name))
     report = patch["tactile"].to_dict()
-    assert report["vertices"] > 3  # few, as a patch is no larger than the features there
+    assert report["vertices"] > 1  # few, as a patch is no larger than the features there
     assert report["vertex_distance_mean"] < 0.05 * report["radius"]
 
 
