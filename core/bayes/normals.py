@@ -102,7 +102,9 @@ def scatter(contacts: Array, normals: Array, slopes: Array) -> tuple[float, floa
 
     The curves run from the point outward. Both are root mean squares, and the angle is in radians.
     """
-    ahead = contacts[:, :2] / np.maximum(np.linalg.norm(contacts[:, :2], axis=1, keepdims=True), 1e-300)
+    # The azimuth of a contact above or below the point is 0, which serves as well as any.
+    azimuth = np.arctan2(contacts[:, 1], contacts[:, 0])
+    ahead = np.column_stack([np.cos(azimuth), np.sin(azimuth)])
     tangents = np.column_stack([ahead, np.einsum("ni,ni->n", slopes, ahead)])
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
     certainty = np.linalg.norm(normals, axis=1)
