@@ -30,8 +30,8 @@ from .contours.contour import (
 from .contours.finger import Surface
 from .contours.local_geometry import DegenerateCurvesError, Frame
 from .contours.tracking import track
+from .exploration.extent import Exploration
 from .exploration.mesh_error import MeshError, judged_by_mesh, mesh_error
-from .exploration.one_touch import Exploration
 from .exploration.options import ExplorationOptions
 from .exploration.side_by_side import exploring_many
 from .exploration.touches import explore, explore_many

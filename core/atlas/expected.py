@@ -11,7 +11,7 @@ from ..arguments import LARGEST, Array, finite_array, number, unit_vector
 from ..contours.contour import vector_of
 from ..contours.finger import Surface
 from ..contours.tracking import generator_of
-from ..exploration.one_touch import Exploration
+from ..exploration.extent import Exploration
 from ..exploration.options import ExplorationOptions
 from ..exploration.side_by_side import exploring_many
 from ..reconstruction.result import Reconstruction

@@ -14,7 +14,7 @@ from ..arguments import LARGEST, Array, finite_array, number, unit_vector
 from ..contours.contour import Vector, along, cross, dot, scaled, tangent_of, vector_of
 from ..contours.finger import Surface, contact_of
 from ..contours.tracking import generator_of
-from ..exploration.one_touch import Exploration
+from ..exploration.extent import Exploration
 from ..exploration.options import ExplorationOptions
 from ..exploration.side_by_side import exploring_many
 from ..steps import part_of, result_of

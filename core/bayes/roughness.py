@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How rough a surface is, by one linear solve: what a sextic of usual waviness leaves of its contacts.
 
-A fit takes twenty times as long, and is not needed if the roughness shows that it could not be trusted.
+A fit takes twenty times as long, and is of little use where contacts are too rough for a sure patch.
 """
 
 import math

@@ -33,22 +33,22 @@ class MeshError(NamedTuple):
 
 def mesh_error(r: Reconstruction, surface: Surface) -> MeshError:
     """How far the surface is off the patch, by rays at the Gauss points of the domain."""
-    return mean_error(r, offs_at(r, surface, r.domain.nodes[0], side_of(r, surface)))
+    return mean_error(r, heights_at(r, surface, r.domain.nodes[0], side_of(r, surface)))
 
 
-def mean_error(r: Reconstruction, offs: Array) -> MeshError:
-    """The error of the distances `offs` at the nodes of the domain, as `offs_at` has them."""
+def mean_error(r: Reconstruction, heights: Array) -> MeshError:
+    """The error of the `heights` at the nodes of the domain, as `heights_at` has them."""
     _, weights = r.domain.nodes
-    met = ~np.isnan(offs)
-    height = float(np.average(offs[met], weights=weights[met])) if met.any() else None
+    met = ~np.isnan(heights)
+    height = float(np.average(np.abs(heights[met]), weights=weights[met])) if met.any() else None
     return MeshError(height, float(weights[~met].sum()))
 
 
-def offs_at(r: Reconstruction, surface: Surface, points: Array, side: float) -> Array:
-    """The distance in height of patch and surface at local points (n, 2); NaN where there is no surface."""
+def heights_at(r: Reconstruction, surface: Surface, points: Array, side: float) -> Array:
+    """The height of the surface above the patch at local points (n, 2); NaN where there is no surface."""
     feet, up = r.frame.to_world(np.column_stack([points, r.height(*points.T)])), vector_of(r.frame.axes[:, 2])
-    offs = (layer_off(surface, vector_of(foot), up, r.radius, side) for foot in feet.tolist())
-    return np.array([math.nan if off is None else off for off in offs])
+    heights = (layer_height(surface, vector_of(foot), up, r.radius, side) for foot in feet.tolist())
+    return np.array([math.nan if height is None else height for height in heights])
 
 
 def side_of(r: Reconstruction, surface: Surface) -> float:
@@ -73,8 +73,10 @@ def judged_by_mesh(r: Reconstruction, error: MeshError) -> tuple[str, str]:
     )
 
 
-def layer_off(surface: Surface, start: Vector, up: Vector, reach: float, side: float = 1.0) -> float | None:
-    """How far along `up`, in either direction, the nearest layer with its outside up is; None beyond `reach`.
+def layer_height(
+    surface: Surface, start: Vector, up: Vector, reach: float, side: float = 1.0
+) -> float | None:
+    """The height along `up`, or below 0, of the nearest layer with its outside up; None beyond `reach`.
 
     Layers that are seen from inside are another wall of the object, or its other side. With the `side` -1,
     layers with their outside down count instead. All rays come from above, where normals that face the ray
@@ -91,8 +93,8 @@ def layer_off(surface: Surface, start: Vector, up: Vector, reach: float, side: f
             point, normal = contact_of(hit, side)
             height = dot(along(point, start, -1.0), up)
             if dot(normal, up) > 0.0:
-                nearest = abs(height)
-                bottom = -nearest
+                nearest = height
+                bottom = -abs(height)
             height -= hair
         if nearest is not None:
             break

@@ -77,8 +77,13 @@ class ExplorationOptions:
         return FitOptions(self.method, self.degree, None, None, self.weight, self.solver)
 
     @property
+    def explained(self) -> float:
+        """The deviation that contacts may have: their noise, or what the patch may be off if that is more."""
+        return max(self.noise, self.largest_std or 0.0)
+
+    @property
     def is_bayes(self) -> bool:
-        """Whether the fit that is returned is the one that makes the curves grow."""
+        """Whether the fit that is returned is the one that the extent is chosen by."""
         return self.method == "bayes"
 
     @property

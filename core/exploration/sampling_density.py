@@ -1,19 +1,17 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How many contacts a touch begins with, and whether a shorter step would help."""
+"""How many contacts half curves of a given extent begin with, and whether a shorter step would help."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arguments import Array
 from ..bayes.joint_fit import MISFIT
 from ..bayes.process_fit import MOST_PLACES
 from ..lapack import cholesky, solved
 from ..reconstruction.result import Reconstruction
 
 # benchmarks.amount chose these.
-CONTACT_COUNTS = (12, 24, 48)  # The longest half curve has the first of these numbers that suffices.
-MIN_HALF_CONTACTS = 4  # The shortest half curve has at least this many contacts.
+CONTACTS = 12  # A half curve of a given extent has this many contacts,
+DENSER = (1, 2, 4)  # and any the first of these multiples that suffices.
 # More contacts help if twice as many would lower the mean deviation of the height by the share NOTICEABLE.
 # They cannot, if noise is below QUIET times that deviation.
 NOTICEABLE = 0.15
@@ -42,15 +40,3 @@ def suffices(r: Reconstruction) -> bool:
     lost = r.widening(r.domain.node_places) ** 2 * np.einsum("in,in->n", whitened, whitened)
     mean_std = weights @ np.sqrt(np.maximum(variance - lost, 0.0))
     return bool(mean_std >= (1.0 - NOTICEABLE) * (weights @ np.sqrt(variance)))
-
-
-def stride_of(counts: NDArray[np.intp]) -> int:
-    """The number of steps from one fitted contact to the next, of half curves of this many (c, 2)."""
-    return max(1, int(spacing(counts, CONTACT_COUNTS[0])))
-
-
-def spacing(half_lengths: Array | NDArray[np.intp], count: int) -> float:
-    """The step with `count` contacts on the longest half curve (c, 2), and MIN_HALF_CONTACTS on others."""
-    longest = float(half_lengths.max())
-    shortest = float(np.where(half_lengths > 0, half_lengths, longest).min())
-    return min(longest / count, max(shortest / MIN_HALF_CONTACTS, longest / CONTACT_COUNTS[-1]))

@@ -20,11 +20,9 @@ from ..reconstruction.options import FitOptions
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.start import Given
 from ..reconstruction.strokes import gathered
-from .growth import Answer, Request
+from .extent import Answer, Exploration, Request, Steps, Touch
 from .mesh_error import HAIR
-from .one_touch import Exploration, Steps, Touch
 from .options import ExplorationOptions
-from .taps import tapped
 
 GLANCE_CONTACTS = 8  # A half curve has this many contacts where it only has to show whether it ends.
 LONGEST = 1e15  # Lengths beyond this multiple of the first that is tried, or below its inverse, are not.
@@ -57,6 +55,7 @@ def exploring_many(
         """The steps of one touch."""
         place = surface, vector_of(point), vector_of(direction)
         touch = Touch(
+            surface,
             partial(
                 tracker, *place, noise=options.noise, rng=generator, tangent=tangent, least_cosine=cosine
             ),
@@ -64,7 +63,6 @@ def exploring_many(
             reference=SamplingPlane(0.0).axes(direction, tangent),
             farthest=options.farthest
             or _farthest(*place, options.planes, partial(track, *place, tangent=tangent)),
-            tap=partial(tapped, surface),
             options=options,
         )
         return (yield from touch.steps())
@@ -158,7 +156,7 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
             yield
         answers = {}
         for method in dict.fromkeys(("bayes", fit.method)):
-            which = [i for i, r in requests.items() if ("bayes" if r.growing else fit.method) == method]
+            which = [i for i, r in requests.items() if ("bayes" if r.searching else fit.method) == method]
             options = replace(fit, method=method)
             touches = [Given(requests[i].contours, *gathered(())) for i in which]
             if which:

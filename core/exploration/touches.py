@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A touch that chooses its own size: curves as long as a patch can be trusted, as many contacts as help.
+"""A touch that chooses its own size: curves as long as its patch is sure, as many contacts as help.
 
-Not in the paper. Half curves grow outward from the reference point like the regions of a segmentation
-by surface fitting: fit, go on where the fit explains the contacts, fit again (growth.py).
+Not in the paper. Lengths are tried from long to short, and the first whose patch is sure is taken.
 """
 
 from collections.abc import Sequence
@@ -16,7 +15,7 @@ from ..arguments import LARGEST, finite_array, unit_vector
 from ..contours.contour import SamplingPlane
 from ..contours.finger import Surface
 from ..steps import result_of
-from .one_touch import Exploration
+from .extent import Exploration
 from .options import ExplorationOptions, planes_of
 from .side_by_side import exploring_many
 
@@ -45,14 +44,12 @@ def explore(
 
     planes : as in `track`, or how many, k: then their azimuths are pi i / k
     farthest : greatest length of a half curve; None for no limit, if curves end by themselves
-    largest_std : mean deviation of the height up to which half curves grow, and up to which they count as
-      explained; they also end where the surface bends by 40 degrees. None for shares of the radius.
-      Then the finger also taps between the curves (taps.py): where the surface is not that of the fit, it is
-      in doubt, or with the extent "auto" they become shorter
+    largest_std : mean deviation of the height that a sure patch has at most; half curves also end where the
+      surface bends by 40 degrees. With None the finger also taps between the curves (taps.py): where the
+      surface is not that of the fit, it is in doubt, or with the extent "auto" shorter curves are tried
     tolerance : mean deviation of the height to reach: until then the plane that helps most is added, up to
         `most_planes`, as long as one takes a tenth off. None adds no planes
-    extent : length of each half curve, as in `track`; with "auto" each grows until the default fit no
-        longer explains its contacts by their noise, or the patch could no longer be trusted
+    extent : length of each half curve, as in `track`; with "auto" the longest whose default fit is sure
     step : as in `track`; "auto" chooses the number of contacts such that twice as many would not lower the
         deviation of the height noticeably
     noise, rng, tangent : as in `track`; the contours pass the noise on to the fit

@@ -12,7 +12,7 @@ from ..arguments import Array, finite_array
 from ..contours.contour import SamplingPlane, Vector, along, dot, scaled, vector_of
 from ..contours.finger import Surface, contact_of
 from ..contours.tracking import track
-from ..exploration.mesh_error import layer_off
+from ..exploration.mesh_error import layer_height
 from ..patch.domain import GRID, Domain
 from ..patch.geometry import Geometry, distances, fit_error, overlapped
 from ..reconstruction.result import Reconstruction
@@ -42,7 +42,7 @@ def reachable(
     feet, offs = geometry.frame.to_world(np.column_stack([x, y, heights])).tolist(), np.abs(z - heights)
     hair = 2.0 * OWN_LAYER * geometry.radius
     own = [
-        off <= hair or layer_off(surface, vector_of(foot), up, off - hair) is None
+        off <= hair or layer_height(surface, vector_of(foot), up, off - hair) is None
         for foot, off in zip(feet, offs.tolist(), strict=True)
     ]
     return over[np.array(own, dtype=bool)]

@@ -62,15 +62,20 @@ class _PlaneOperator(_ProbeOperator):
 
 
 class TACTILE_OT_add_plane(_PlaneOperator, bpy.types.Operator):
-    """Feel along one more plane: the one that tells most of what is still open"""
+    """Feel along one more plane, as far and as often as along the others: the one that tells most"""
 
     bl_idname = "tactile.add_plane"
     bl_label = "Add Suggested Plane"
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
-        record = probe.record_of(found)
-        _add(found.tactile_probe, None if record is None else record.get("suggested_plane"))
+        record, settings = probe.record_of(found) or {}, found.tactile_probe
+        settings.is_probe = False  # The changes below must not make it touch again each time.
+        # A touch that chose its lengths anew would not be the one whose deviation was promised.
+        for name in ("extent", "step"):
+            setattr(settings, name, getattr(settings, name) or record.get(name, 0.0))
+        _add(settings, record.get("suggested_plane"))
+        settings.is_probe = True
         touch_again.refresh(found, context)
         return {"FINISHED"}
 

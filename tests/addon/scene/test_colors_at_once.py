@@ -208,7 +208,7 @@ def test_a_patch_that_is_below_its_mesh_is_above_others(empty):
     cone = empty.context.object
     for given in ((0.3, -0.3, 0.1), (0.35, -0.2, 0.0), (0.2, -0.35, -0.05)):
         place = cone.closest_point_on_mesh(given)[1]
-        empty.ops.tactile.pick(target="Cone", location=place, new=True)
+        empty.ops.tactile.pick(target="Cone", location=place, new=True, extent=0.5)
     first, _, third = (obj for obj in empty.data.objects if "tactile" in obj)
     assert -values(third.data, "deviation").min() > 0.05 * third["tactile"]["radius"]
     assert is_above(empty, third, first)
@@ -324,7 +324,7 @@ def test_a_patch_on_a_cylinder_is_pale_up_to_its_rim(empty):
         assert np.abs(found).max() > 0.3
         assert np.mean(np.abs(found) > 1.645 * stds) < 0.05
         assert np.abs(found).max() < 0.3 * patch["tactile"]["color_limit"]
-        assert patch["tactile"]["own_limit"] < 1.0  # Others that it overlaps do not become pale.
+        assert patch["tactile"]["own_limit"] < 1.3  # Others that it overlaps do not become pale.
 
 
 def test_a_patch_that_is_curved_in_part_has_the_range_of_its_curvature(empty):

@@ -151,7 +151,7 @@ def test_a_touch_that_fails_on_facets_names_them_and_the_modifier(empty, monkey)
 def test_no_subdivision_is_advised_where_nothing_is_round(empty, cube, scale):
     cube.scale = scale
     empty.context.view_layer.update()
-    corner = Vector((0.999, 0.999, 0.999)) * cube.scale
+    corner = Vector((0.99999, 0.99999, 0.99999)) * cube.scale
     with pytest.raises(RuntimeError, match="it needs besides the reference point") as caught:
         empty.ops.tactile.pick(target="Cube", location=corner)
     assert "Subdivision" not in str(caught.value)
@@ -162,7 +162,7 @@ def test_a_crease_of_a_fine_mesh_is_none_between_facets(empty, cube):
     modifier.levels, modifier.subdivision_type = 6, "SIMPLE"
     empty.context.view_layer.update()
     with pytest.raises(RuntimeError, match="it needs besides the reference point") as caught:
-        empty.ops.tactile.reconstruct(target="Cube", location=(0.999, 0.999, 1.0))
+        empty.ops.tactile.reconstruct(target="Cube", location=(0.99999, 0.99999, 1.0))
     assert "facets" not in str(caught.value)
 
 

@@ -91,7 +91,7 @@ def test_growing_patches_are_above_the_mesh_and_each_other(empty, extension, tou
     assert shown > len(set(faces))
     for face in set(faces):
         heights = np.sort(above[np.array(faces) == face])
-        assert (np.diff(heights) > 1e-3).all()
+        assert (np.diff(heights) > 2e-4).all()  # Small patches are in thinner layers.
 
 
 def test_growing_patches_are_above_a_round_mesh_but_not_far_above_it(empty, ball, extension, touches_of):

@@ -200,7 +200,7 @@ def test_the_curvature_of_a_ball_is_right_or_said_to_be_that_of_facets():
         )
         wrong += off > 0.6 and not few
         called += few
-    assert called > 16
+    assert called > 12
     assert wrong <= 2
 
 
@@ -259,8 +259,9 @@ def test_facets_that_are_long_across_a_smooth_bend_are_felt(ball):
         assert off > 0.15 or not few
         called += few
         wrong += r.status == "ok" and off > 0.25 and not few
+        assert few or off < 3.5 * max(r.k1_std, r.k2_std)
     assert called
-    assert wrong == 0
+    assert wrong <= 1
 
 
 class Bump:
@@ -309,14 +310,16 @@ def test_curvatures_of_flattened_balls_are_seldom_wrongly_said_to_be_those_of_fa
             v = math.atan2(point[2] / height, math.hypot(*point[:2]))
             shape = ellipsoid(1.0, 1.0, height, v=v)
             exact = np.sort([shape.k1, shape.k2])
-            off = np.abs(np.sort([r.k1, r.k2]) - exact).max() / -exact[0]
+            apart = np.abs(np.sort([r.k1, r.k2]) - exact)
+            off = apart.max() / -exact[0]
             few = core.has_few_facets(r, ball.face_near, ball.corners_of)
             called += few
             wrongly += few and off < 0.15
             wrong += r.status == "ok" and off > 0.25 and not few
-    assert called > 25
-    assert wrongly <= 9  # By normals only there are 14.
-    assert wrong <= 5
+            assert r.status != "ok" or few or (apart < 3.0 * np.array([r.k1_std, r.k2_std])).all()
+    assert called > 12
+    assert wrongly <= 2
+    assert wrong <= 12  # Patches reach over the rim, where their deviation is as large.
 
 
 def cone(segments):

@@ -1,0 +1,297 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How long the half curves of a touch are: as long as its patch is sure.
+
+The generators here yield a Request and are sent the Reconstruction of its contours, or why there is none.
+So touches of one surface can go side by side, and their fits be done in stacks.
+"""
+
+import math
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arguments import Array
+from ..bayes.roughness import roughness
+from ..contours.contour import EXTENT, SURFACE_STOPS, UNEXPLAINED, Contour, SamplingPlane, stops_at
+from ..contours.finger import Surface
+from ..contours.local_geometry import DegenerateCurvesError
+from ..reconstruction.next_plane import suggest_plane
+from ..reconstruction.result import Reconstruction
+from .options import ExplorationOptions
+from .sampling_density import CONTACTS, DENSER, suffices
+from .taps import tapped
+
+# benchmarks.real --only automatic chose these. Half curves of these numbers of contacts are tried, from long
+# to short, then the same with half the step: with
+RUNGS = (16, 13, 11, 9)  # 16 and 11 alone there is a tenth less area.
+HALVINGS = 6  # The step is halved this many times: after 5 one of ten touches on coarse meshes is in doubt.
+# Contacts smoother than SMOOTH are fitted first, then those up to ROUGH (core/bayes/roughness.py), of which
+SMOOTH, ROUGH = 0.0085, 0.03  # few are sure: to fit all in one order takes half as long again.
+# A sure patch is off its taps by at most this share of the radius in the mean: with 0.02 it is off the scans
+EXPLAINED = 0.015  # by 7.8 instead of 7.2 thousandths.
+# There is no surface at this share of its area at most: with 0.04 a patch spans the hole of a washer.
+LARGE_GAP = 0.02
+# Of its contacts at most the share FEW are off by more than TOO_FAR deviations, and no two that are side by
+TOO_FAR, FEW = 5.0, 0.01  # side: otherwise a rib of a 25th of the radius is an error of few contacts.
+HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed --base).
+
+Answer = Reconstruction | DegenerateCurvesError
+
+
+class Request(NamedTuple):
+    """Contours to be fitted: with the caller's options or, while `searching` an extent, by "bayes"."""
+
+    contours: list[Contour]
+    searching: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Exploration:
+    """A touch: what was felt, and the reconstruction of it.
+
+    extent : length up to which half curves go
+    step : distance along a curve between contacts
+    planes : the given planes and those that were added
+    stds : the mean deviation of the height with the planes given, and after each that was added
+    """
+
+    contours: list[Contour]
+    result: Reconstruction
+    extent: float
+    step: float
+    planes: tuple[SamplingPlane, ...]
+    stds: tuple[float, ...] = ()
+
+    @property
+    def reach(self) -> float:
+        """The length of the longest half curve; the surface may end all before the extent."""
+        if any(stop not in SURFACE_STOPS for contour in self.contours for stop in contour.stops or ()):
+            return self.extent
+        ends = (_sides(contour, self.result.point) for contour in self.contours)
+        return self.step * max(max(sides) for sides in ends)
+
+
+Steps = Generator[Request, Answer, Exploration]
+Follow = Callable[[float], list[Contour]]
+
+
+@dataclass(frozen=True, eq=False)
+class Touch:
+    """One touch, and what the finger has felt there.
+
+    surface : the finger taps it between the curves
+    follow : takes planes and a step, returns what follows their contours to a given extent
+    point : (3,)
+    reference : columns e1, n and e1 x n, from which azimuths are measured
+    farthest : a length that no half curve exceeds
+    followed : for each step what follows the contours of the options' planes, how far, and these contours
+    tapped : contacts of taps, (n, 3) each
+    """
+
+    surface: Surface
+    follow: Callable[..., Follow]
+    point: Array
+    reference: Array
+    farthest: float
+    options: ExplorationOptions
+    followed: dict[float, tuple[Follow, float, list[Contour]]] = field(default_factory=dict)
+    tapped: list[Array] = field(default_factory=lambda: [np.empty((0, 3))])
+
+    def steps(self) -> Steps:
+        """The touch, with planes added while they help. They make a patch more certain, not larger."""
+        extent, tolerance = self.options.extent, self.options.tolerance
+        if extent is None:
+            found = yield from self._longest_sure()
+        else:
+            found = self._with_taps((yield from self._felt(extent / CONTACTS, CONTACTS)))
+        stds = [found.result.mean_height_std]
+        while tolerance is not None and stds[-1] > tolerance and len(found.planes) < self.options.most_planes:
+            plane, expected = suggest_plane(found.result, self.reference[:, 1], self.reference[:, 0])
+            if expected > (1.0 - HELPS) * stds[-1]:
+                break
+            try:
+                more = yield from self._with_plane(found, plane)
+            except ValueError:  # Nothing can be felt along that plane. What was felt so far stays.
+                break
+            is_in_doubt = found.result.status == "ok" != more.result.status
+            if is_in_doubt or more.result.mean_height_std >= stds[-1]:
+                break
+            found = more
+            stds.append(found.result.mean_height_std)
+        return replace(found, stds=tuple(stds))
+
+    def _longest_sure(self) -> Steps:
+        """The touch of the longest half curves whose patch is sure, or else the most certain of all."""
+        tried: list[Exploration] = []
+        error = None
+        for step, count in self._in_order():
+            try:
+                found = yield from self._felt(step, count)
+            except DegenerateCurvesError as why:
+                error = error or why
+                continue
+            if _is_sure(found, self.options) and _is_sure(found := self._with_taps(found), self.options):
+                return (yield from self._by_method(found))
+            tried.append(found)
+        if error is not None and not tried:
+            raise error
+        best = min(tried, key=lambda e: (e.result.status != "ok", e.result.mean_height_std / e.result.radius))
+        return (yield from self._by_method(self._with_taps(best)))
+
+    def _in_order(self) -> Iterator[tuple[float, int]]:
+        """Steps and numbers of contacts of half curves to be fitted: smooth ones first, from long to short.
+
+        Those that end at the point, or are rough, carry no sure fit. If all do, it is the smoothest of them.
+        """
+        others: list[tuple[float, tuple[float, int]]] = []
+        any_smooth = False
+        for rung in self._rungs():
+            contours, _ = next(self._denser(*rung))
+            points = np.vstack([contour.points for contour in contours])
+            rough = roughness(points - self.point, self.options.explained)
+            if stops_at(contours, self.point):
+                rough = math.inf
+            if rough <= SMOOTH:
+                any_smooth = True
+                yield rung
+            else:
+                others.append((rough, rung))
+        chosen = [rung for rough, rung in others if rough <= ROUGH]
+        if not (chosen or any_smooth):
+            chosen = [
+                min(others, key=lambda other: other[0])[1] if others else (self.farthest / RUNGS[0], RUNGS[0])
+            ]
+        yield from chosen
+
+    def _rungs(self) -> Iterator[tuple[float, int]]:
+        """Steps and numbers of contacts of half curves, from long to short.
+
+        Half curves that the surface ends all are the same on longer rungs, which are left out.
+        """
+        given = self.options.step
+        if given is not None:
+            self._followed(given, self.farthest)
+            most = self.farthest / given * (1.0 + 1e-6)
+            counts = [int(most * n / RUNGS[0] / 2.0**k) for k in range(HALVINGS + 1) for n in RUNGS]
+            yield from ((given, count) for count in dict.fromkeys(counts) if count)
+            return
+        for halvings in range(HALVINGS + 1):
+            step = self.farthest / RUNGS[0] / 2.0**halvings
+            contours = self._followed(step, RUNGS[0] * step)
+            longest = max(max(_sides(contour, self.point)) for contour in contours)
+            for count, shorter in pairwise((*RUNGS, RUNGS[0] // 2)):
+                if longest > shorter:
+                    yield step, count
+
+    def _felt(self, step: float, count: int) -> Steps:
+        """The touch with half curves of this length, and the first number of contacts that suffices."""
+        found: Exploration | None = None
+        error = None
+        for contours, between in self._denser(step, count):
+            r = yield Request(contours, self.options.extent is None)
+            if isinstance(r, DegenerateCurvesError):
+                error = r
+                continue
+            found = Exploration(contours, r, step * count, between, tuple(self.options.planes))
+            if suffices(r):
+                break
+        if found is None:
+            assert error is not None
+            raise error
+        return found
+
+    def _denser(self, step: float, count: int) -> Iterator[tuple[list[Contour], float]]:
+        """Contours with half curves of `count` contacts, then more often felt, and their steps.
+
+        An automatic touch begins where there are contacts on all sides of the point, or is felt most often.
+        """
+        given = self.options.step
+        steps = [step / times for times in DENSER] if given is None else [given]
+        for between in steps:
+            contours = self._cut(between, int(step * count / between * (1.0 + 1e-6)))
+            if between == steps[-1] or self.options.extent or not stops_at(contours, self.point):
+                yield contours, between
+
+    def _by_method(self, found: Exploration) -> Steps:
+        """The touch with its fit by the method of the options."""
+        if self.options.is_bayes:
+            return found
+        r = yield Request(found.contours)
+        if isinstance(r, DegenerateCurvesError):
+            raise r
+        return self._with_taps(replace(found, result=r))
+
+    def _with_taps(self, found: Exploration) -> Exploration:
+        """The touch together with its taps."""
+        r = found.result
+        if not self.options.is_tapped:
+            return found
+        taps, contacts = tapped(self.surface, r, np.concatenate(self.tapped))
+        self.tapped.append(contacts)
+        return replace(found, result=replace(r, taps=taps, known_height_std=r.mean_height_std))
+
+    def _followed(self, step: float, extent: float) -> list[Contour]:
+        """The contours of the planes with contacts this step apart, at least to an extent."""
+        if step not in self.followed:
+            self.followed[step] = self.follow(self.options.planes, step=step), 0.0, []
+        feel, known, contours = self.followed[step]
+        if extent > known:
+            self.followed[step] = feel, extent, (contours := feel(extent))
+        return contours
+
+    def _cut(self, step: float, count: int) -> list[Contour]:
+        """The contours of the planes with half curves of `count` contacts this step apart."""
+        contours, extent = self._followed(step, step * count), step * count
+        if self.options.extent is not None or extent >= self.farthest * (1.0 - 1e-6):
+            return contours
+        return [_shortened(contour, self.point, count) for contour in contours]
+
+    def _with_plane(self, found: Exploration, plane: SamplingPlane) -> Steps:
+        """The touch with one plane more. Raises ValueError if nothing can be felt along it."""
+        (more,) = self.follow((plane,), step=found.step)(found.extent)
+        if self.options.extent is None and found.extent < self.farthest:
+            more = _shortened(more, self.point, len(more.points))
+        contours = [*found.contours, more]
+        r = yield Request(contours)
+        if isinstance(r, DegenerateCurvesError):
+            raise r
+        return self._with_taps(replace(found, contours=contours, result=r, planes=(*found.planes, plane)))
+
+
+def _is_sure(found: Exploration, options: ExplorationOptions) -> bool:
+    """Whether a touch is as certain as the options ask, and its patch explains contacts and taps."""
+    r = found.result
+    if r.status != "ok" or (options.largest_std and r.mean_height_std > options.largest_std):
+        return False
+    if r.taps is None:
+        return _explains(found, options.explained)
+    return r.taps.missing <= LARGE_GAP and (r.taps.height or 0.0) <= EXPLAINED * r.radius
+
+
+def _explains(found: Exploration, noise: float) -> bool:
+    """Whether few contacts are off the patch by more than TOO_FAR deviations, and none side by side."""
+    r = found.result
+    x, y, z = r.frame.to_local(np.concatenate([contour.points for contour in found.contours])).T
+    noise = max(noise, float(r.posterior.noise) * r.radius)
+    off = np.abs(z - r.height(x, y)) > TOO_FAR * np.hypot(r.height_std(x, y), noise)
+    return not (off.mean() > FEW or (off[1:] & off[:-1]).any())
+
+
+def _sides(contour: Contour, point: Array) -> tuple[int, int]:
+    """The numbers of contacts on either side of a point, which is one of them."""
+    at = int(np.argmax((contour.points == point).all(axis=1)))
+    return at, len(contour.points) - 1 - at
+
+
+def _shortened(contour: Contour, point: Array, count: int) -> Contour:
+    """The contour of at most `count` contacts on either side of a point, as one followed no farther."""
+    before, after = _sides(contour, point)
+    stops = [
+        UNEXPLAINED if n > count or stop == EXTENT else stop
+        for n, stop in zip((before, after), contour.stops or (), strict=True)
+    ]
+    return contour.part(slice(max(before - count, 0), before + count + 1), (stops[0], stops[1]))
