@@ -35,7 +35,7 @@ import numpy as np
 
 from core import SamplingPlane, explore, reconstruct, track
 from core.bayes import evidence, kernel, process_fit
-from core.exploration import one_touch, taps
+from core.exploration import extent, taps
 from core.patch.monge import exponents, monomials
 from core.reconstruction import result, status
 from tools import blender
@@ -134,7 +134,7 @@ def constants(**values):
     """Sets constants of the process, the taps or the status within this context."""
     modules = [
         m
-        for m in (kernel, evidence, process_fit, result, one_touch, taps, status)
+        for m in (kernel, evidence, process_fit, result, extent, taps, status)
         if any(hasattr(m, name) for name in values)
     ]
     if unknown := [name for name in values if not any(hasattr(m, name) for m in modules)]:
@@ -415,8 +415,11 @@ TAPS = {
     "CONTRADICTING": (1.5, 3.0),
     "NEAR_RIM": (0.9, 0.95),
     "WITHIN": (0.5, 0.75),
-    "SHORTER": (1.1, 1.3),
     "LARGE_GAP": (0.01, 0.04),
+    "EXPLAINED": (0.01, 0.02),
+    "TOO_FAR": (3.0, 10.0),
+    "SMOOTH": (0.006, 0.012),
+    "ROUGH": (0.0085, 0.06),
 }
 ENOUGH_AREA = 0.99  # The least share of the largest area: less area costs more than it is worth.
 

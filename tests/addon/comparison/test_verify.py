@@ -234,15 +234,15 @@ def test_a_mesh_that_contradicts_the_patch_is_a_doubt_with_a_warning(empty, patc
     assert f"Warning: {message}" in capfd.readouterr().out
 
 
-def test_the_few_vertices_of_a_coarse_mesh_do_not_change_a_good_verdict(empty):
-    """Two are over the patch, at its rim, where it is off by more than twice as much as on average."""
-    empty.ops.mesh.primitive_cylinder_add()
-    assert empty.ops.tactile.reconstruct(location=(0.9, -0.4, -0.1)) == {"FINISHED"}
+def test_the_vertices_of_a_coarse_mesh_do_not_change_a_good_verdict(empty):
+    """They are farther out than the rest of their facets, and off by more than twice the deviation."""
+    empty.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
+    assert empty.ops.tactile.reconstruct(location=(0.9, -0.4, -0.1), extent=0.4) == {"FINISHED"}
     patch = empty.context.object
     found = verified(empty, patch)
-    assert found["vertices"] == 2
+    assert found["vertices"] == 25
     assert found["vertex_distance_mean"] > 2.0 * patch["tactile"]["height_std"]
-    assert patch["tactile"]["height_error"] < patch["tactile"]["height_std"]
+    assert patch["tactile"]["height_error"] < 2.0 * patch["tactile"]["height_std"]
     assert patch["tactile"]["status"] == "ok"
 
 

@@ -413,7 +413,12 @@ def test_a_map_of_few_wide_faces_between_many_narrow_ones_has_the_range_of_the_w
     assert np.count_nonzero(wide) == 6 < 0.2 * record["patches"]
     assert found["area"].sum() == pytest.approx(28.0, rel=0.1)  # that of the cube in the world
     assert painted["tactile_map"]["color_limit"] >= 2.0 * found["height_std"][wide].min()
-    assert np.median(found["error"][wide]) < 1e-6 < found["error"][wide].max() < 0.6 * painted["tactile_map"]["color_limit"]
+    assert (
+        np.median(found["error"][wide])
+        < 1e-6
+        < found["error"][wide].max()
+        < 0.6 * painted["tactile_map"]["color_limit"]
+    )
 
 
 def test_faces_of_no_area_are_nothing_to_feel(empty):
