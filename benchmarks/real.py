@@ -35,7 +35,8 @@ import numpy as np
 
 from core import SamplingPlane, explore, reconstruct, track
 from core.bayes import evidence, kernel, process_fit
-from core.exploration import extent, taps
+from core.exploration import extent as extents
+from core.exploration import taps
 from core.patch.monge import exponents, monomials
 from core.reconstruction import result, status
 from tools import blender
@@ -134,7 +135,7 @@ def constants(**values):
     """Sets constants of the process, the taps or the status within this context."""
     modules = [
         m
-        for m in (kernel, evidence, process_fit, result, extent, taps, status)
+        for m in (kernel, evidence, process_fit, result, extents, taps, status)
         if any(hasattr(m, name) for name in values)
     ]
     if unknown := [name for name in values if not any(hasattr(m, name) for m in modules)]:
