@@ -47,16 +47,18 @@ def tapped(surface: Surface, r: Reconstruction, felt: Array) -> tuple[Taps, Arra
     missed, offs = np.isnan(heights), np.abs(np.nan_to_num(heights))
     nodes, at_nodes = r.domain.nodes[0], heights_at(r, surface, r.domain.nodes[0], side)
     within, missing = mean_error(r, at_nodes)
-    x, y, z = r.frame.to_local(felt[r.domain.contains(*r.frame.to_local(felt)[:, :2].T)]).T
+    local = r.frame.to_local(felt)
+    x, y, z = local[r.domain.contains(*local[:, :2].T)].T
+    before = np.abs(z - r.height(x, y))
     contradicts = (
         (offs > TOO_FAR_OFF * stds).any()
-        or (np.abs(z - r.height(x, y)) > TOO_FAR_OFF * np.hypot(r.height_std(x, y), noise)).any()
+        or (before > TOO_FAR_OFF * np.hypot(r.height_std(x, y), noise)).any()
         or offs.mean() > CONTRADICTING * stds.mean()
         or (within or 0.0) > CONTRADICTING * r.mean_height_std
     )
-    off = max(float(offs.max()), within or 0.0) / r.radius if contradicts else 0.0
+    off = max(float(offs.max()), float(before.max(initial=0.0)), within or 0.0) / r.radius
     x, y = np.concatenate([where, nodes]).T
     above = np.concatenate([heights, at_nodes])
     known = ~np.isnan(above)
     contacts = r.frame.to_world(np.column_stack([x, y, r.height(x, y) + above])[known])
-    return Taps(len(offs), int(missed.sum()), off, missing, within), contacts
+    return Taps(len(offs), int(missed.sum()), off if contradicts else 0.0, missing, within), contacts

@@ -354,6 +354,32 @@ def test_planes_are_added_to_what_was_felt_while_they_help():
     assert true_error(wavy(), more) < true_error(wavy(), three)
 
 
+@pytest.mark.parametrize("noise", [0.05, 0.2])
+def test_a_plane_that_makes_the_patch_less_certain_is_not_added(noise, monkeypatch):
+    monkeypatch.setattr(extent, "HELPS", -1.0)
+    s = surfaces.torus(40, 20, 0.6)
+    found = core.explore(s, s.point, s.normal, extent=12.0, step=1.0, tolerance=0.0, noise=noise, rng=0)
+    assert (np.diff(found.stds) < 0.0).all()
+    assert found.stds[-1] == found.result.mean_height_std
+    assert len(found.contours) == len(found.planes) < 6
+
+
+def test_half_curves_have_one_length_where_the_surface_goes_on():
+    surface = surfaces.ellipsoid(60.0, 20.0, 20.0, 0.6, 0.5)
+    found = core.explore(surface, surface.point, surface.normal, farthest=30.0)
+    lengths = [length for c in found.contours for length in reach(c, surface.point)]
+    assert found.result.status == "ok"
+    assert lengths == pytest.approx([found.extent] * 6, rel=0.02)
+
+
+def test_a_given_extent_has_the_verdict_of_an_automatic_one():
+    for surface in (rib(9.0, 0.8, 1.0), wavy(), short_waves()):
+        chosen = explore(surface)
+        given = explore(surface, extent=chosen.extent, step=chosen.step)
+        assert given.result.status == chosen.result.status
+        assert given.result.patch.k1 == pytest.approx(chosen.result.patch.k1, abs=1e-9)
+
+
 def test_planes_are_added_until_it_is_good_enough():
     stds = explore(wavy(), tolerance=0.0).stds
     assert explore(wavy(), tolerance=1.001 * stds[1]).stds == pytest.approx(stds[:2])

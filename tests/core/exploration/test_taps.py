@@ -13,7 +13,7 @@ import surfaces
 import core
 from core.exploration import extent
 from core.exploration.extent import LARGE_GAP
-from core.exploration.taps import places
+from core.exploration.taps import places, tapped
 from core.reconstruction.status import DOUBTFUL_GAP, Taps
 
 FARTHEST = 30.0
@@ -168,6 +168,16 @@ def test_a_touch_is_in_doubt_where_the_surface_is_off_within_its_rim():
     assert (shorter.result.status, shorter.result.taps.off) == ("ok", 0.0)
     assert 0.25 * FARTHEST < shorter.extent < FARTHEST
     assert core.mesh_error(shorter.result, pit).height < 1e-6
+
+
+@pytest.mark.parametrize(("place", "status"), [((6.0, 3.0), "uncertain"), ((20.0, 10.0), "ok")])
+def test_what_taps_of_longer_curves_have_felt_within_the_rim_counts(place, status):
+    surface = surfaces.plane()
+    r = core.explore(surface, (0.0, 0.0, 0.0), UP, extent=10.0).result
+    taps, contacts = tapped(surface, r, np.array([[*place, -1.0]]))
+    assert replace(r, taps=taps).status == status
+    assert taps.off * r.radius == pytest.approx(1.0 if status == "uncertain" else 0.0)
+    assert contacts[:, 2] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_small_hole_is_reported_and_is_no_doubt():
