@@ -76,6 +76,7 @@ class Exploration:
 
 
 Steps = Generator[Request, Answer, Exploration]
+Fit = Generator[Request, Answer, Reconstruction]
 Follow = Callable[[float], list[Contour]]
 
 
@@ -189,19 +190,18 @@ class Touch:
 
     def _felt(self, step: float, count: int) -> Steps:
         """The touch with half curves of this length, and the first number of contacts that suffices."""
-        found: Exploration | None = None
-        error = None
+        found: Exploration | DegenerateCurvesError
         for contours, between in self._denser(step, count):
-            r = yield Request(contours, self.options.extent is None)
-            if isinstance(r, DegenerateCurvesError):
-                error = r
+            try:
+                r = yield from _fitted(contours, self.options.extent is None)
+            except DegenerateCurvesError as error:
+                found = error
                 continue
             found = Exploration(contours, r, step * count, between, tuple(self.options.planes))
             if suffices(r):
                 break
-        if found is None:
-            assert error is not None
-            raise error
+        if isinstance(found, DegenerateCurvesError):
+            raise found
         return found
 
     def _denser(self, step: float, count: int) -> Iterator[tuple[list[Contour], float]]:
@@ -220,10 +220,7 @@ class Touch:
         """The touch with its fit by the method of the options."""
         if self.options.is_bayes:
             return found
-        r = yield Request(found.contours)
-        if isinstance(r, DegenerateCurvesError):
-            raise r
-        return self._with_taps(replace(found, result=r))
+        return self._with_taps(replace(found, result=(yield from _fitted(found.contours))))
 
     def _with_taps(self, found: Exploration) -> Exploration:
         """The touch together with its taps."""
@@ -256,10 +253,16 @@ class Touch:
         if self.options.extent is None and found.extent < self.farthest:
             more = _shortened(more, self.point, len(more.points))
         contours = [*found.contours, more]
-        r = yield Request(contours)
-        if isinstance(r, DegenerateCurvesError):
-            raise r
+        r = yield from _fitted(contours)
         return self._with_taps(replace(found, contours=contours, result=r, planes=(*found.planes, plane)))
+
+
+def _fitted(contours: list[Contour], searching: bool = False) -> Fit:
+    """The reconstruction of contours. Raises DegenerateCurvesError if they carry none."""
+    r = yield Request(contours, searching)
+    if isinstance(r, DegenerateCurvesError):
+        raise r
+    return r
 
 
 def _is_sure(found: Exploration, options: ExplorationOptions) -> bool:

@@ -720,6 +720,7 @@ def test_the_suggested_planes_lower_the_deviation(empty, ball):
         assert new["planes"][:-1] == old["planes"]
         assert new["planes"][-1] == pytest.approx([old["suggested_plane"]["azimuth"], 0.0], abs=1e-3)
         assert new["height_std"] < old["height_std"]
+        assert (new["extent"], new["step"]) == pytest.approx((old["extent"], old["step"]), rel=1e-6)
     assert not empty.ops.tactile.add_plane.poll()
 
 
