@@ -18,7 +18,7 @@ modifier.levels = modifier.render_levels = 3  # the exports of .ply and .stl tak
 bpy.context.view_layer.update()
 
 evaluated = suzanne.evaluated_get(bpy.context.evaluated_depsgraph_get())
-hit, forehead, _, _ = evaluated.ray_cast((-0.35, -5.0, 0.85), (0.0, 1.0, 0.0))
+hit, forehead, _, _ = evaluated.ray_cast((-0.35, -5.0, 0.8), (0.0, 1.0, 0.0))
 assert hit
 bpy.context.scene.cursor.location = suzanne.matrix_world @ forehead
 
