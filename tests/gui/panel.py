@@ -126,7 +126,7 @@ def hidden():
     yield from toggled(HANDLES, lambda: not settings.show_handles)
     check("... and one the handles", not settings.show_handles)
     picture("panel_hidden")
-    settings.azimuths[0] += 0.1
+    settings.azimuths[0] += 0.01
     yield from until(is_complete)
     yield from toggled(CONTOURS, lambda: not lines.hide_viewport)
     yield from toggled(HANDLES, lambda: settings.show_handles)

@@ -158,7 +158,7 @@ def drag_handles():
     picture("tilted")
     yield from undo_redo("a plane tilted", before)
 
-    before = state()
+    before, reach = state(), extent(probe())
     free = 0.5 * (probe().tactile_probe.azimuths[0] + probe().tactile_probe.azimuths[1]) + math.pi
     gui.drag(handle(free, 1.0), handle(free, 0.7))
     yield 1
