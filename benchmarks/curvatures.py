@@ -6,7 +6,7 @@
 touches. Scans need bpy. The command prints a Markdown table with a row for each kind of touch: of exact
 surfaces, random shapes, curves whose common point is found or given with an error (every other one on a
 ball), scans, and flat tops between two folds, where both curvatures are 0: with given extents, with an
-automatic one, and without normals; and flat cones, beside their tips.
+automatic one, and without normals; and flat cones, near their tips.
 
 The true curvatures of a scan are those of a polynomial fitted to many points of the mesh: of the quartic over
 0.6 of the radius, which a fit with a process states, or of the sextic over the domain, which it states
@@ -44,7 +44,7 @@ ERRORS = (0.03, 0.05), (0.1, 0.3)  # a fit passes the former, and warns of the l
 TOP = 0.2  # Half of the width between folds.
 EXTENTS, SCAN_PLANES = (16, 8), (3, 5)
 TRUTHS = (0.6, 4), (1.0, 6)  # Shares of the radius, and degrees,
-DENSE, EXPLAINED = 1000, 0.01  # of polynomials near to so many points; these are off it by less, in L.
+DENSE, EXPLAINED = 1000, 0.01  # of polynomials fitted to this many points; these are off it by less, in L.
 HEAD = "touches|number|ok|within|k1|k2|error / std|std|error|> 5 std|and > .03 / L|heights|at point"
 
 
@@ -86,11 +86,11 @@ def felt(surface, extent, planes, rng, noise=0.0, steps=STEPS):
     return track(surface, surface.point, surface.normal, sampling, noise=noise, rng=rng, **lengths)
 
 
-def exact(seed, noise, is_told=True):
+def exact(seed, noise, noise_is_given=True):
     """A surface of SURFACES and its fit in one of EXACT_PLANES; all of both have their turn."""
     surface, extent = list(SURFACES.values())[seed % len(SURFACES)]
     contours = felt(surface, extent, EXACT_PLANES[seed % 3], np.random.default_rng(seed), noise)
-    given = contours if is_told else [replace(contour, noise=None) for contour in contours]
+    given = contours if noise_is_given else [replace(contour, noise=None) for contour in contours]
     return surface, reconstruct(surface.point, given, outward=surface.normal)
 
 
@@ -107,7 +107,7 @@ def random(seed, noise):
 
 
 def found(seed, count, noise=None, errors=None):
-    """Three curves of `count` contacts with noise in all directions; `noise` is what the fit is told.
+    """Three curves of `count` contacts with noise in all directions; `noise` is that of the fit.
 
     errors : those of the given point along the normal and sideways; None if the point is found
     """
@@ -144,7 +144,7 @@ def fold(seed, angle, is_automatic=False, has_normals=True):
 
 
 def cone(seed):
-    """A flat cone, touched beside its tip with an automatic extent."""
+    """A flat cone, touched near its tip with an automatic extent."""
     rng = np.random.default_rng(seed)
     slope, away, turn = rng.uniform(0.1, 0.7), rng.uniform(0.2, 0.9), rng.uniform(0.0, math.pi)
     surface = surfaces.Exact(
@@ -158,15 +158,15 @@ def cone(seed):
 
 ROWS = {
     **{f"exact, noise {noise:g}": partial(exact, noise=noise) for noise in (0.0, 0.02, 0.1)},
-    "exact, noise 0.02, not told": partial(exact, noise=0.02, is_told=False),
+    "exact, noise 0.02, not given": partial(exact, noise=0.02, noise_is_given=False),
     **{f"random shapes, noise {noise:g}": partial(random, noise=noise) for noise in (0.0, 0.05)},
     **{f"found point, {n} contacts": partial(found, count=n) for n in (15, 41, 101, 400)},
-    **{f"found point, {n} contacts, told": partial(found, count=n, noise=NOISE) for n in (41, 400)},
+    **{f"found point, {n} contacts, noise given": partial(found, count=n, noise=NOISE) for n in (41, 400)},
     **{f"given point, {e[0]:g} and {e[1]:g} off": partial(found, count=41, errors=e) for e in ERRORS},
     **{f"folds of {angle} degrees": partial(fold, angle=angle) for angle in (5, 10, 15, 20)},
     **{f"folds of {a} degrees, automatic": partial(fold, angle=a, is_automatic=True) for a in (5, 20)},
     **{f"folds of {a} degrees, no normals": partial(fold, angle=a, has_normals=False) for a in (5, 10, 20)},
-    "beside the tip of a cone, automatic": cone,
+    "near the tip of a cone, automatic": cone,
 }
 
 

@@ -83,17 +83,8 @@ def process_fit(
     off, most = np.abs(posterior.residuals(given.contacts)), np.maximum(posterior.noise, least)
     rms = np.sqrt((weights * off**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0))
     for i in np.flatnonzero(rms > UNEXPLAINED_MISFIT * least):
-        # The point is a contact like the others: on facets its residual may be as large.
-        there, point = np.flatnonzero(weights[i]), np.array([[0.0, 0.0, offsets[i]]])
-        normals = (
-            given.normals[i] if not given.normals.size else np.vstack([given.normals[i][there], 0.0 * point])
-        )
-        weight = (least[i] / max(least[i], given.point_std[i])) ** 2
-        roots = np.sqrt(np.append(weights[i, there], weight))
-        rank, n = np.append(ranks[i, there], 0), len(roots)
-        # Places are spread on each half of a curve, whichever way it runs and whichever curve is the first.
-        places = np.flatnonzero(rank * min(n, MOST_PLACES) % n < MOST_PLACES)
-        touch = touch_of(np.vstack([given.contacts[i, there], point]), roots, normals, places)
+        there = np.flatnonzero(weights[i])
+        touch = _with_point(given, weights[i], ranks[i], float(offsets[i]), int(i))
         carried = touch.at_places()
         hyper, use_gp = process_hyperparameters(*carried, float(least[i]), float(most[i]))
         if not (use_gp or (given.noise_is_known[i] and _is_texture(off[i, there], float(given.noise[i])))):
@@ -102,13 +93,30 @@ def process_fit(
             found[i] = replace(process_posterior(touch, hyper, posterior.visibility[i]), sextic=found[i])
             continue
         quartic = nearest_quartic(
-            *_mean_given(touch, hyper, *carried), touch.contacts[places, :2], hyper.process
+            *_mean_given(touch, hyper, *carried), touch.contacts[touch.places, :2], hyper.process
         )
         turns[i] = frame_update(np.eye(3), quartic, given.tangent[i])[0]
         scales[i] = np.hypot(*(touch.contacts @ turns[i])[:, :2].T).max()
         hyper = hyper._replace(noise=hyper.noise / scales[i], process=hyper.process / scales[i] ** 2)
         found[i] = process_posterior(touch.moved(turns[i], scales[i]), hyper, posterior.visibility[i])
     return turns, scales, found
+
+
+def _with_point(given: Observations, weights: Array, ranks: NDArray[np.intp], offset: float, i: int) -> Touch:
+    """Touch i of a stack with the reference point, which is a contact like the others.
+
+    On facets its residual may be as large. weights, ranks : (n,), as in `process_fit`
+    """
+    there, point = np.flatnonzero(weights), np.array([[0.0, 0.0, offset]])
+    normals = (
+        given.normals[i] if not given.normals.size else np.vstack([given.normals[i][there], 0.0 * point])
+    )
+    least = max(given.noise[i], PROCESS_MISFIT)
+    roots = np.sqrt(np.append(weights[there], (least / max(least, given.point_std[i])) ** 2))
+    rank, n = np.append(ranks[there], 0), len(roots)
+    # Places are spread on each half of a curve, whichever way it runs and whichever curve is the first.
+    places = np.flatnonzero(rank * min(n, MOST_PLACES) % n < MOST_PLACES)
+    return touch_of(np.vstack([given.contacts[i, there], point]), roots, normals, places)
 
 
 def _is_texture(off: Array, noise: float) -> bool:

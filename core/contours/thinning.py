@@ -21,7 +21,7 @@ from .curves import WINDOW, distances_from_point
 # With this many contacts a contour no fit is worse, with noise in all directions (tests: test_thinning).
 MOST_CONTACTS = 100
 # test_thinning judges these: no rest may ruin a fit, and no contacts without one may change.
-CELLS = 1000  # The curve's longer side has so many cells. A place is a cell and its neighbors.
+CELLS = 1000  # The curve's longer side has this many cells. A place is a cell and its neighbors.
 RESTING = 4  # A place with more times the usual number of contacts is a rest.
 TANGENT = 1 / 16  # This share of the cells with contacts shows the tangent, also that of a steep curve.
 DECIMALS = 9  # Weights are compared to this decimal, so that rounding does not choose.
@@ -90,7 +90,7 @@ def _along(r: Array, distance: Array) -> tuple[Array, Array]:
 
 
 def _weights(counts: NDArray[np.intp]) -> Array:
-    """The weight (m,) of a contact in each of the cells along a curve, which have so many contacts (m,)."""
+    """The weight (m,) of a contact in each cell along a curve, given the numbers of contacts (m,) there."""
     crowd = np.maximum(np.convolve(counts, np.ones(3), mode="same"), 1.0)
     shares = counts / crowd
     places = shares.sum()

@@ -26,13 +26,14 @@ from .sampling_density import CONTACTS, DENSER, suffices
 from .taps import tapped
 
 # benchmarks.real --only automatic chose these. Half curves of these numbers of contacts are tried, from long
-# to short, then the same with half the step: with
-RUNGS = (16, 13, 11, 9)  # 16 and 11 alone there is a tenth less area.
-HALVINGS = 6  # The step is halved this many times: after 5 one of ten touches on coarse meshes is in doubt.
-# Contacts smoother than SMOOTH are fitted first, then those up to ROUGH (core/bayes/roughness.py), of which
-SMOOTH, ROUGH = 0.0085, 0.03  # few are sure: to fit all in one order takes half as long again.
-# A sure patch is off its taps by at most this share of the radius in the mean: with 0.02 it is off the scans
-EXPLAINED = 0.015  # by 7.8 instead of 7.2 thousandths.
+# to short, then the same with half the step. Fewer give less area on scans.
+RUNGS = (16, 13, 11, 9)
+HALVINGS = 6  # The step is halved this many times. Fewer leave touches of coarse meshes in doubt.
+# Contacts smoother than SMOOTH are fitted first: with 0.006 patches of scans have a seventh less area, with
+SMOOTH = 0.0085  # more there are more fits.
+ROUGH = 0.03  # Then those up to this roughness are fitted: with SMOOTH, five of 900 more are in doubt.
+# A sure patch is off its taps by at most this share of the radius in the mean: with 0.02 one of 900 is off by
+TAPS_OFF = 0.015  # over 2 %, with 0.01 there is a seventh less area.
 # There is no surface at this share of its area at most: with 0.04 a patch spans the hole of a washer.
 LARGE_GAP = 0.02
 # Of its contacts at most the share FEW are off by more than TOO_FAR deviations, and no two that are side by
@@ -272,7 +273,7 @@ def _is_sure(found: Exploration, options: ExplorationOptions) -> bool:
         return False
     if r.taps is None:
         return _explains(found, options.explained)
-    return r.taps.missing <= LARGE_GAP and (r.taps.height or 0.0) <= EXPLAINED * r.radius
+    return r.taps.missing <= LARGE_GAP and (r.taps.height or 0.0) <= TAPS_OFF * r.radius
 
 
 def _explains(found: Exploration, noise: float) -> bool:

@@ -130,15 +130,7 @@ def _result(
     domain = _domain(curves, strokes, contours)
     if isinstance(domain, DegenerateCurvesError):
         return domain
-    converged = True
-    if fit.posteriors is None:
-        k1, k2 = start.kappas[i].tolist()
-        paper = options.method, options.weight, options.solver
-        a, converged = coefficients(curves, k1, k2, fit.degrees[i], domain, *paper)
-        patch = MongePatch(k1, k2, a).scaled(scale)
-        surface: HeightField = patch.scaled(1.0 / scale)
-    else:
-        surface, patch = fit.posteriors[i], fit.posteriors[i].patch(fit.degrees[i]).scaled(scale)
+    surface, patch, converged = _surface(start, fit, i, curves, domain, options)
     point_std = min(float(start.point_stds[i] / fit.radii[i]), 1.0)
     return Reconstruction(
         Geometry(frame, scale, surface, domain.scaled(scale)),
@@ -152,6 +144,20 @@ def _result(
         point=start.points[i],
         known_curves=start.curves.at([i]) if point_std < 1.0 else None,
     )
+
+
+def _surface(
+    start: Start, fit: _Fit, i: int, curves: Curves, domain: Domain, options: FitOptions
+) -> tuple[HeightField, MongePatch, bool]:
+    """The surface of touch i in unit radius, its patch in the caller's unit, and whether the fit converged."""
+    scale = float(fit.radii[i])
+    if fit.posteriors is not None:
+        return fit.posteriors[i], fit.posteriors[i].patch(fit.degrees[i]).scaled(scale), True
+    k1, k2 = start.kappas[i].tolist()
+    paper = options.method, options.weight, options.solver
+    a, converged = coefficients(curves, k1, k2, fit.degrees[i], domain, *paper)
+    patch = MongePatch(k1, k2, a).scaled(scale)
+    return patch.scaled(1.0 / scale), patch, converged
 
 
 def _curves(start: Start, fit: _Fit, i: int) -> Curves:

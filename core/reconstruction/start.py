@@ -109,41 +109,36 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, options:
     good = [i for i, error in enumerate(errors) if error is None]
     if not good:
         return None, touches, errors
-    curves = curves.at(good)
-    axes, kappas, radii = darboux_frames(curves, normals[good])
-    strokes = [
-        _stroke_means(curves.at(row), touches[i], axes[row], radii[row], points[i], given[i])
-        for row, i in enumerate(good)
-    ]
-    stds = [
-        _std(
-            options.noise,
-            max(size, min(number for _, number in thin[i])),
-            [*(c.noise or 0.0 for c in touches[i]), given[i].noise / math.sqrt(size)],
-        )
-        for i, (_, size) in zip(good, strokes, strict=True)
-    ]
-    known = [
-        not len(contacts) and (options.noise is not None or None not in [c.noise for c in touches[i]])
-        for i, (contacts, _) in zip(good, strokes, strict=True)
-    ]
-    contacts = [contacts for contacts, _ in strokes]
-    point_stds = [
-        _point_std(points[i], given[i].contours, options, radius)
-        for i, radius in zip(good, radii, strict=True)
-    ]
-    start = Start(
-        points[good],
-        axes,
-        kappas,
-        radii,
-        curves,
-        contacts,
-        np.array(stds),
-        np.array(known),
-        np.array(point_stds),
+    chosen = [given[i] for i in good], [thin[i] for i in good], curves.at(good), normals[good]
+    return _start(points[good], *chosen, options), touches, errors
+
+
+def _start(
+    points: Array,
+    given: Sequence[Given],
+    thin: Sequence[Sequence[tuple[Contour, int]]],
+    curves: Curves,
+    normals: Array,
+    options: FitOptions,
+) -> Start:
+    """The start of b fits to curves with surface normals (b, 3).
+
+    thin : the thinned contours of each, and the number of contacts in each mean
+    """
+    axes, kappas, radii = darboux_frames(curves, normals)
+    strokes, stds, known, point_stds = [], [], [], []
+    for i, (point, touch, each) in enumerate(zip(points, given, thin, strict=True)):
+        contours = [contour for contour, _ in each]
+        contacts, size = _stroke_means(curves.at(i), contours, axes[i], radii[i], point, touch)
+        noises = [*(c.noise or 0.0 for c in contours), touch.noise / math.sqrt(size)]
+        strokes.append(contacts)
+        stds.append(_std(options.noise, max(size, min(number for _, number in each)), noises))
+        has_noise = options.noise is not None or None not in [c.noise for c in contours]
+        known.append(not len(contacts) and has_noise)
+        point_stds.append(_point_std(point, touch.contours, options, radii[i]))
+    return Start(
+        points, axes, kappas, radii, curves, strokes, np.array(stds), np.array(known), np.array(point_stds)
     )
-    return start, touches, errors
 
 
 def _errors(
