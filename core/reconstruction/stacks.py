@@ -149,7 +149,7 @@ def _result(
 def _surface(
     start: Start, fit: _Fit, i: int, curves: Curves, domain: Domain, options: FitOptions
 ) -> tuple[HeightField, MongePatch, bool]:
-    """The surface of touch i in unit radius, its patch in the caller's unit, and whether the fit converged."""
+    """The surface of touch i in unit radius, its patch in the caller's unit, and if the fit converged."""
     scale = float(fit.radii[i])
     if fit.posteriors is not None:
         return fit.posteriors[i], fit.posteriors[i].patch(fit.degrees[i]).scaled(scale), True
