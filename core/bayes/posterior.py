@@ -256,8 +256,9 @@ class SurfacePosterior(HeightField):
 
     def curvature_std(self) -> float:
         """Standard deviation of the normal curvature at the origin, in the direction where it is largest."""
-        bent = _bent()
-        variances = np.einsum("ni,ni->n", bent @ self.covariance[2:FREE, 2:FREE], bent)
+        directions = bent()
+        covariances = directions @ self.covariance[2:FREE, 2:FREE]
+        variances = np.einsum("ni,ni->n", covariances, directions)
         return math.sqrt(max(float(variances.max()), 0.0))
 
     def null_space_dimension(self, degree: int) -> int:
@@ -323,7 +324,7 @@ def _departures() -> Array:
 
 
 @cache
-def _bent() -> Array:
+def bent() -> Array:
     """The second derivatives of x^2, xy and y^2 in 18 directions, (18, 3)."""
     azimuths = np.pi / 18.0 * np.arange(18)
     return 2.0 * monomials(np.column_stack([np.cos(azimuths), np.sin(azimuths)]), TERMS[2:FREE])

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..arguments import LARGEST, Array, finite_array, many
 from ..bayes.bends import Bends, bends_of
 from ..bayes.joint_fit import OUTLYING, posterior_of
+from ..bayes.near_point import curvature_contradiction
 from ..bayes.normals import contradiction, measured_normals, scatter
 from ..bayes.other_curves import contradicting_curve
 from ..bayes.posterior import SurfacePosterior, coefficients_of, terms_to
@@ -359,6 +360,11 @@ class Reconstruction:
         return contradicting_curve(
             self.contacts / self.radius, curve, self.posterior, self.noise, self.point_std
         )
+
+    @cached_property
+    def curvature_contradiction(self) -> float:
+        """The number of deviations by which curvatures are off those of the contacts near the point."""
+        return curvature_contradiction(self.contacts / self.radius, self.posterior, self.curvature_covariance)
 
     @cached_property
     def _fitted_normals(self) -> tuple[Array, Array]:

@@ -73,7 +73,15 @@ def doubt(r: Judged) -> tuple[str, str] | None:
             f"{r.condition_number:.1e}): use another method or add sampling planes."
         )
     # The gravest come first.
-    each = (_about_point, _about_data, _about_heights, _about_frame, _about_curves, _about_bends)
+    each = (
+        _about_point,
+        _about_data,
+        _about_heights,
+        _about_frame,
+        _about_curves,
+        _about_bends,
+        _about_curvatures,
+    )
     message = next((sentence for about in each for sentence in about(r)), None)
     return None if message is None else ("uncertain", message)
 
@@ -243,6 +251,16 @@ def _about_bends(r: Judged) -> Iterator[str]:
         yield (
             "The surface turns at only one or two places along a curve, as at folds or facets, and the "
             f"curvature is that of these: {advice}, or make the facets finer."
+        )
+
+
+def _about_curvatures(r: Judged) -> Iterator[str]:
+    """Whether the contacts near the point contradict the curvatures."""
+    if r.curvature_contradiction > SIGNIFICANT:
+        advice = "move the point away from it" if _has_tried_shorter(r) else "use a shorter extent"
+        yield (
+            "The contacts near the point bend otherwise than the patch, as beside a tip or a fold within it: "
+            f"{advice}."
         )
 
 
