@@ -6,8 +6,6 @@ Not in the paper. A patch has the curvatures of a quartic over QUARTIC_SHARE of 
 fold bends the patch, the quartic of least squares of the contacts within this share has other ones.
 """
 
-import math
-
 import numpy as np
 
 from ..arguments import Array
@@ -20,7 +18,7 @@ ENOUGH = 1.5  # The least number of contacts, as a multiple of the rank, that sh
 
 
 def curvature_contradiction(contacts: Array, posterior: SurfacePosterior, covariance: Array) -> float:
-    """The largest number of deviations by which a normal curvature is off that of the contacts near the point.
+    """The deviations, at most, by which a normal curvature is off that of the contacts near the point.
 
     contacts : (n, 3), besides the reference point, in the frame and in unit radius
     posterior : of all contacts; covariance : (3, 3), of its coefficients of x^2, xy and y^2
