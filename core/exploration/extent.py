@@ -269,19 +269,22 @@ def _fitted(contours: list[Contour], searching: bool = False) -> Fit:
 def _is_sure(found: Exploration, options: ExplorationOptions) -> bool:
     """Whether a touch is as certain as the options ask, and its patch explains contacts and taps."""
     r = found.result
-    if r.status != "ok" or (options.largest_std and r.mean_height_std > options.largest_std):
+    if options.largest_std:
+        return r.mean_height_std <= options.largest_std and _explains(found, options)
+    if r.status != "ok":
         return False
     if r.taps is None:
-        return _explains(found, options.explained)
+        return _explains(found, options)
     return r.taps.missing <= LARGE_GAP and (r.taps.height or 0.0) <= TAPS_OFF * r.radius
 
 
-def _explains(found: Exploration, noise: float) -> bool:
+def _explains(found: Exploration, options: ExplorationOptions) -> bool:
     """Whether few contacts are off the patch by more than TOO_FAR deviations, and none side by side."""
     r = found.result
     x, y, z = r.frame.to_local(np.concatenate([contour.points for contour in found.contours])).T
-    noise = max(noise, float(r.posterior.noise) * r.radius)
-    off = np.abs(z - r.height(x, y)) > TOO_FAR * np.hypot(r.height_std(x, y), noise)
+    noise = max(options.noise, float(r.posterior.noise) * r.radius)
+    explained = TOO_FAR * np.hypot(r.height_std(x, y), noise)
+    off = np.abs(z - r.height(x, y)) > np.maximum(explained, options.largest_std or 0.0)
     return not (off.mean() > FEW or (off[1:] & off[:-1]).any())
 
 
