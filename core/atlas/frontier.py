@@ -165,7 +165,9 @@ class Frontier:
             heapq.heappush(self.queue, entry)
         return found
 
-    def uncovered(self, reference: ReferenceMesh) -> Generator[float, None, list[tuple[RimPlace, Contact]]]:
+    def uncovered(
+        self, reference: ReferenceMesh, tolerance: float
+    ) -> Generator[float, None, list[tuple[RimPlace, Contact]]]:
         """Places on the border of a mesh beyond which the object goes on, each with a contact there.
 
         Yields 1 after each.
@@ -178,7 +180,7 @@ class Frontier:
                 for share in REACHES
             ]
             # Across a notch the finger meets the mesh again.
-            off = [c for c in contacts if c is not None and reference.away(c[0]) > OFF * reference.edge]
+            off = [c for c in contacts if c is not None and reference.away(c[0]) > tolerance]
             if off:
                 found.append((place, off[-1]))
         return found

@@ -87,7 +87,7 @@ def cover_contacts(
     contacts, noise, doubt = _contacts(contours_or_strokes, outward, noise)
     yield 0.0
     found, charts = yield from _patches(_Cloud(contacts, cKDTree(contacts.points), noise, largest))
-    reference = yield from part_of(joined_surface(found, charts, largest, contacts), 1.0, 1.0)
+    reference = yield from part_of(joined_surface(found, charts, largest, contacts.off), 1.0, 1.0)
     places = uncovered_places(reference, charts)
     atlas = Atlas(tuple(found), charts, reference, largest, places, contacts=contacts)
     return replace(atlas, doubt=doubt or _off_contacts(atlas, contacts, noise))

@@ -39,7 +39,7 @@ SMOOTHINGS = 3  # This often vertices move toward their neighbors' mean.
 NEAREST = 8  # A place is felt if it is close to one of this many contacts that are nearest:
 BETWEEN = 1.5  # within this multiple of the distance of its own neighbors,
 ONE_SIDED = 0.82  # if the mean of the directions to these is shorter; it is 2 / pi on a straight border.
-BRIDGED = 4.0  # Holes that are not larger than this many cells of the indicator are bridged.
+BRIDGED = 4.0  # Holes that are not larger than this many squares, of a cell or the tolerance, are bridged.
 # Vertices that were off by more cells, or are of folded triangles, are moved again, this often.
 FAR, STEPS = 0.05, 4
 WALL = 0.25  # Edges are at most this share of the thinnest wall, so that none is lost between them.
@@ -117,6 +117,9 @@ class Mesh(NamedTuple):
         return len(self.triangles) > 0 and self._sides[3]
 
 
+Felt = Callable[[Array, Array], Array]  # Distances (n,) by which a surface is off places; inf where unfelt.
+
+
 class MeasuredContacts(NamedTuple):
     """Contacts that were measured: there the surface was felt, though patches may leave gaps between them.
 
@@ -130,15 +133,19 @@ class MeasuredContacts(NamedTuple):
     reach: Array
     links: Indices
 
-    def near(self, points: Array, normals: Array) -> NDArray[np.bool_]:
-        """Which places (k, 3) with normals (k, 3) are between contacts, of which a near one faces alike."""
+    def off(self, points: Array, normals: Array) -> Array:
+        """How far contacts are from places (k, 3) with normals (k, 3) between them, (k,).
+
+        It is inf for places that are not between contacts, or if none near them faces alike.
+        """
         from scipy.spatial import cKDTree
 
         away, at = cKDTree(self.points).query(points, NEAREST)
         alike = np.einsum("kbi,ki->kb", self.normals[at], normals) > FACING
         ways = normalized(self.points[self.links[at]] - points[:, None, None])
         between = np.linalg.norm(ways.mean(axis=2), axis=2) < ONE_SIDED
-        return (alike & between & (away < BETWEEN * self.reach[at])).any(axis=1)
+        is_felt = (alike & between & (away < BETWEEN * self.reach[at])).any(axis=1)
+        return np.where(is_felt, away[:, 0], np.inf)
 
 
 def memory_of(vertices: Array, triangles: Indices, edge: float, lattice: float = np.inf) -> float:
@@ -168,16 +175,19 @@ def meshed(
     indicator: Indicator,
     edge: float,
     ended: Callable[[Array], NDArray[np.bool_]] | None = None,
-    contacts: MeasuredContacts | None = None,
+    felt: Felt | None = None,
+    span: float = 0.0,
 ) -> Generator[float, None, tuple[Mesh, Mesh]]:
     """The mesh of the surface, and that of what the indicator has where nothing was felt.
 
     edge : about the length of its edges, which are shorter than a quarter of the thinnest wall
     ended : which of places (n, 3) are beyond the ends of a mesh of the surface that was made before
-    contacts : the surface was felt there, too
+    felt : how far the surface is off places (n, 3) with normals (n, 3), if it was felt there, too
+    span : a length, at least a cell of the indicator; holes of up to BRIDGED squares of it are bridged
 
     Yields the share that is done.
     """
+    span = max(span, indicator.cell)
     edge = min(edge, WALL * indicator.resolved)
     size, halvings = lattice_of(indicator, edge)
     vertices, up, triangles = yield from _level(indicator, size)
@@ -196,7 +206,7 @@ def meshed(
     yield 0.9
     surface = SurfaceSample._make(values[np.append(old, parents)] for values in surface)
     surface = surface._replace(std=np.hypot(surface.std, CONTINUED_STD * unfelt))
-    return (yield from _trim_unfelt(vertices, triangles, surface, indicator, ended, contacts))
+    return (yield from _trim_unfelt(vertices, triangles, surface, indicator, ended, felt, span))
 
 
 def _level(indicator: Indicator, size: float) -> Generator[float, None, tuple[Array, Array, Indices]]:
@@ -331,7 +341,8 @@ def _trim_unfelt(
     surface: SurfaceSample,
     indicator: Indicator,
     ended: Callable[[Array], NDArray[np.bool_]] | None,
-    contacts: MeasuredContacts | None,
+    felt: Felt | None,
+    span: float,
 ) -> Generator[float, None, tuple[Mesh, Mesh]]:
     """The mesh without triangles where nothing was felt, and these; yields the share that is done.
 
@@ -342,6 +353,16 @@ def _trim_unfelt(
     yield 0.9
     near = surface.rho < MARGIN
     inside = near & ((surface.rho < INSIDE) | (surface.creases > 0))
+    off = np.where(inside, 0.0, np.inf)
+    if felt is not None:
+        others = np.flatnonzero(~inside)
+        (off[others],) = yield from chunked(
+            lambda some: (felt(vertices[some], indicator.outward(vertices[some])),),
+            PLACES_AT_ONCE,
+            0.9,
+            others,
+        )
+        inside[others] = np.isfinite(off[others])
     beyond = triangles[~inside[triangles].all(axis=1)]
     count, piece = connected_pieces(beyond[:, :2].ravel(), beyond[:, 1:].ravel(), len(vertices))
     yield 0.9
@@ -350,16 +371,15 @@ def _trim_unfelt(
     if ended is None:
         # Each vertex has a third of its triangles' area, so that a hole is as large with any length of edges.
         far = np.linalg.norm(triangle_cross(vertices[beyond]), axis=1) / 6.0 * (~near[beyond]).sum(axis=1)
-        gone |= ~inside & (np.bincount(piece[beyond[:, 0]], far, count) > BRIDGED * indicator.cell**2)[piece]
+        gone |= ~inside & (np.bincount(piece[beyond[:, 0]], far, count) > BRIDGED * span**2)[piece]
     else:
         outer = np.flatnonzero(~inside & ~gone)
-        (off,) = yield from chunked(lambda some: (ended(some),), PLACES_AT_ONCE, 0.9, vertices[outer])
-        gone[outer] = (np.bincount(piece[outer], np.where(off, 1.0, -1.0), count) > 0.0)[piece[outer]]
+        (beyond_end,) = yield from chunked(lambda some: (ended(some),), PLACES_AT_ONCE, 0.9, vertices[outer])
+        most = np.bincount(piece[outer], np.where(beyond_end, 1.0, -1.0), count) > 0.0
+        gone[outer] = most[piece[outer]]
+        off[~gone] = 0.0
     yield 0.9
-    some = np.flatnonzero(gone)
-    if contacts is not None:
-        gone[some] = ~contacts.near(vertices[some], indicator.outward(vertices[some]))
     std = np.where(surface.patch < 0, indicator.cell, surface.std)
-    std[some] = np.hypot(std[some], indicator.cell)  # No patch is there.
+    std = np.hypot(std, np.minimum(off, span))
     mesh, unfelt = Mesh(vertices, triangles, std, surface.patch), gone[triangles].any(axis=1)
     return mesh.chosen(~unfelt), mesh.chosen(unfelt)

@@ -22,7 +22,7 @@ from .charts import Charts
 from .curvature import NormalSamples, curvatures_of, sheets_of
 from .frontier import RimPlace
 from .indicator import Indicator
-from .meshing import MOST_BYTES, WALL, MeasuredContacts, Mesh, lattice_of, memory_of, meshed
+from .meshing import MOST_BYTES, WALL, Felt, MeasuredContacts, Mesh, lattice_of, memory_of, meshed
 from .reference_mesh import ReferenceMesh
 from .samples import indicated
 
@@ -94,12 +94,15 @@ def joined_surface(
     patches: Sequence[Reconstruction],
     charts: Charts,
     tolerance: float | None,
-    contacts: MeasuredContacts | None = None,
+    felt: Felt | None = None,
 ) -> Generator[float, None, ReferenceMesh]:
-    """The joined surface of patches, as a mesh with edges of the suggested length; yields the share done."""
+    """The joined surface of patches, as a mesh with edges of the suggested length; yields the share done.
+
+    felt : as in `meshed`
+    """
     indicator = yield from indicated(charts, tolerance)
     edge = suggested_edge(patches, charts, indicator)
-    mesh, unfelt = yield from meshed(charts, indicator, edge, None, contacts)
+    mesh, unfelt = yield from meshed(charts, indicator, edge, None, felt, tolerance or 0.0)
     return ReferenceMesh(mesh, indicator, unfelt)
 
 
@@ -389,7 +392,7 @@ class Atlas:
                 f"edge: expected triangles that take {1e-9 * MOST_BYTES:g} GB of memory or less, got "
                 f"{edge:.3g}, which takes {1e-9 * memory:.3g} GB: use a longer one"
             )
-        mesh, _ = yield from meshed(self.charts, indicator, edge, self.reference.ended, self.contacts)
+        mesh, _ = yield from meshed(self.charts, indicator, edge, self.reference.ended, self.contacts and self.contacts.off)
         return mesh if self.border is None else snapped_to_border(mesh, self.border)
 
     def to_dict(self) -> dict[str, Any]:

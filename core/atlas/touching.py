@@ -280,7 +280,7 @@ class _Run:
         charts = yield from part_of(self.joining(earlier), 0.0, JOINED)
         charts = yield from part_of(blend_heights(charts), 0.0, JOINED)
         patches = tuple(e.result for e in self.found)
-        reference = yield from part_of(joined_surface(patches, charts, self.tolerance), JOINED, 1.0)
+        reference = yield from part_of(joined_surface(patches, charts, self.tolerance, self.off), JOINED, 1.0)
         yield 1.0
         for _ in range(BORDERS):
             steps = felt_border(self.frontier.finger, self.frontier.near, reference.mesh)
@@ -290,7 +290,7 @@ class _Run:
         yield from reference.prepared()
         check = yield from self.check(reference)
         yield 1.0
-        uncovered = yield from self.frontier.uncovered(reference)
+        uncovered = yield from self.frontier.uncovered(reference, self.tolerance)
         places, taps = tuple(place for place, _ in uncovered), tuple(self.frontier.taps)
         atlas = Atlas(
             patches, charts, reference, self.tolerance, places, check, taps, border, self.done >= self.most
@@ -301,6 +301,18 @@ class _Run:
         contacts: list[PointNormal] = [contact for _, contact in uncovered]
         contacts += zip(check.points[off], check.normals[off], strict=True)
         return atlas, contacts + (self.uncertain_contacts(atlas.reference.mesh) if atlas.is_rough else [])
+
+    def off(self, points: Array, normals: Array) -> Array:
+        """How far the object is off places (n, 3) with normals (n, 3), (n,); inf beyond the tolerance.
+
+        What the closed surface spans within the tolerance needs no touch.
+        """
+        places = [(vector_of(p), vector_of(n)) for p, n in zip(points, normals, strict=True)]
+        contacts = [self.frontier.finger.near(*place, self.tolerance) for place in places]
+        return np.array([
+            math.inf if contact is None else math.dist(place[0], contact[0])
+            for place, contact in zip(places, contacts, strict=True)
+        ])  # fmt: skip
 
     def uncertain_contacts(self, mesh: Mesh) -> list[PointNormal]:
         """Contacts where the surface is less certain than LIMIT tolerances, apart from each other."""
