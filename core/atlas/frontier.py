@@ -36,7 +36,6 @@ REACHES = (0.35, 0.12, 0.04)  # The finger goes on by these shares of the radius
 DISK_REACHES = 3.0  # What is new is measured on a disk of this many reaches, at most the patch's radius.
 BORDER_RADIUS = 5.0  # The radius of a place on the border of a mesh, in edges.
 BORDER_APART = 0.5  # The distance between such places, in their radii.
-OFF = 0.5  # Beyond a border a contact counts from this many edges off the mesh.
 SLIVER = 0.03  # The blend of patches bridges what is new if it is less than this share of the disk.
 IN_VAIN = 2.0  # What is within this many radii of the least patch of a touch in vain brings nothing, too.
 TRIES = 3  # Touches go on from a place at most this many times.
@@ -169,6 +168,8 @@ class Frontier:
         self, reference: ReferenceMesh, tolerance: float
     ) -> Generator[float, None, list[tuple[RimPlace, Contact]]]:
         """Places on the border of a mesh beyond which the object goes on, each with a contact there.
+
+        tolerance : contacts that the mesh is nearer to do not count
 
         Yields 1 after each.
         """

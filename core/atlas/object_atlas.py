@@ -392,7 +392,9 @@ class Atlas:
                 f"edge: expected triangles that take {1e-9 * MOST_BYTES:g} GB of memory or less, got "
                 f"{edge:.3g}, which takes {1e-9 * memory:.3g} GB: use a longer one"
             )
-        mesh, _ = yield from meshed(self.charts, indicator, edge, self.reference.ended, self.contacts and self.contacts.off)
+        mesh, _ = yield from meshed(
+            self.charts, indicator, edge, self.reference.ended, self.contacts and self.contacts.off
+        )
         return mesh if self.border is None else snapped_to_border(mesh, self.border)
 
     def to_dict(self) -> dict[str, Any]:
