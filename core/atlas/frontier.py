@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..contours.contour import Contour, Vector, cross, dot, vector_of
+from ..contours.contour import Contour, Vector, cross, dot, tangent_of, vector_of
 from ..contours.finger import Contact
 from ..reconstruction.result import Reconstruction
 from ..triangles import normalized
@@ -27,6 +27,7 @@ from .join import stacked, tabulate
 from .meshing import Mesh
 from .reference_mesh import ReferenceMesh
 from .rims import radial_extent
+from .tetrahedra import connected_pieces
 
 # python -m benchmarks.atlas judges these.
 RIM = 24  # Each rim has this many places.
@@ -184,6 +185,29 @@ class Frontier:
             off = [c for c in contacts if c is not None and reference.away(c[0]) > tolerance]
             if off:
                 found.append((place, off[-1]))
+        return found
+
+    def unfelt(self, mesh: Mesh) -> Generator[float, None, list[tuple[RimPlace, Contact]]]:
+        """Places of pieces of a closed surface where nothing was felt, each with a contact near its middle.
+
+        Pieces near which the finger meets nothing are no surface. Yields 1 after each.
+        """
+        found, sides = [], mesh.triangles
+        count, piece = connected_pieces(sides[:, :2].ravel(), sides[:, 1:].ravel(), len(mesh.vertices))
+        normals = mesh.normals
+        for one in range(count):
+            yield 1.0
+            some = np.flatnonzero(piece == one)
+            away = np.linalg.norm(mesh.vertices[some] - mesh.vertices[some].mean(axis=0), axis=1)
+            places = (
+                (vector_of(mesh.vertices[i]), vector_of(normals[i]))
+                for i in some[np.argsort(away, kind="stable")]
+            )
+            for p, n in places:
+                if (contact := self.finger.near(p, n, self.near)) is not None:
+                    ahead = tangent_of(contact[1], None)
+                    found.append((RimPlace(*contact, ahead, float(away.max())), contact))
+                    break
         return found
 
     def _forget_covered(self) -> Generator[None, None, None]:

@@ -282,6 +282,7 @@ class _Run:
         patches = tuple(e.result for e in self.found)
         reference = yield from part_of(joined_surface(patches, charts, self.tolerance, self.off), JOINED, 1.0)
         yield 1.0
+        unfelt = yield from self.frontier.unfelt(reference.unfelt)
         for _ in range(BORDERS):
             steps = felt_border(self.frontier.finger, self.frontier.near, reference.mesh)
             border = yield from part_of(steps, 1.0, 1.0)
@@ -290,7 +291,7 @@ class _Run:
         yield from reference.prepared()
         check = yield from self.check(reference)
         yield 1.0
-        uncovered = yield from self.frontier.uncovered(reference, self.tolerance)
+        uncovered = unfelt + (yield from self.frontier.uncovered(reference, self.tolerance))
         places, taps = tuple(place for place, _ in uncovered), tuple(self.frontier.taps)
         atlas = Atlas(
             patches, charts, reference, self.tolerance, places, check, taps, border, self.done >= self.most
