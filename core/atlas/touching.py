@@ -41,7 +41,7 @@ SIDE_BY_SIDE = 8  # This many touches at once are faster, and still done in a te
 NEAR = 3.0  # A patch ends where the surface is off it by more tolerances.
 AGAIN = 3  # Where something is missing or less certain, touches go on at most this often.
 CHECKS, CHECK_SEED = 512, 0  # This many rays from outside check the surface.
-HAIR = 0.01  # A ray that meets nothing is cast again this share of the tolerance aside.
+HAIR = 0.01  # Rays begin this share of their length above the surface, which they would meet.
 SHARPEST, SPIKES = 64, 16  # This many go to its sharpest vertices, and to the triangles around the sharpest.
 STRAIGHT = 0.5  # A ray must meet what it is aimed at if the cosine between it and the normal is more.
 JOINED = 0.5  # Joining is this share of the way to a surface that is checked.
@@ -258,16 +258,24 @@ class _Run:
         ways = (aims - starts) / np.linalg.norm(aims - starts, axis=1, keepdims=True)
         found, missed, at_random, met = [], [], 0, self.frontier.finger.met
         for i, (start, way, aim) in enumerate(zip(starts, ways, aims, strict=True)):
-            # Between faces of a mesh a ray may slip through, but not a hair aside.
-            near = (vector_of(start + aside) for aside in (0.0, HAIR * self.tolerance))
-            contact = next(filter(None, (met(p, vector_of(way), length) for p in near)), None)
+            contact = met(vector_of(start), vector_of(way), length)
             if contact is not None:
                 found.append(contact)
                 at_random += i < CHECKS
-            elif i < len(facing) and facing[i]:
+            elif i < len(facing) and facing[i] and not self._is_near(vector_of(aim), vector_of(way)):
                 missed.append(aim)
         points, normals = np.array(found).reshape(-1, 2, 3).transpose(1, 0, 2)
         return Check(points, normals, np.array(missed).reshape(-1, 3), at_random)
+
+    def _is_near(self, aim: Vector, way: Vector) -> bool:
+        """Whether the finger meets something near a place if it comes a tolerance aside of the way there."""
+        across = tangent_of(way, None)
+        near, start = self.frontier.near, along(aim, way, -self.frontier.near)
+        for aside in (across, cross(way, across)):
+            for length in (-self.tolerance, self.tolerance):
+                if self.frontier.finger.met(along(start, aside, length), way, 2.0 * near) is not None:
+                    return True
+        return False
 
     def atlas(
         self, earlier: dict[int, tuple[int, Table]]
@@ -282,6 +290,7 @@ class _Run:
         patches = tuple(e.result for e in self.found)
         reference = yield from part_of(joined_surface(patches, charts, self.tolerance, self.off), JOINED, 1.0)
         yield 1.0
+        assert reference.unfelt is not None
         unfelt = yield from self.frontier.unfelt(reference.unfelt)
         for _ in range(BORDERS):
             steps = felt_border(self.frontier.finger, self.frontier.near, reference.mesh)
