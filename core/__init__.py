@@ -13,8 +13,9 @@ from .atlas.measured import atlas_of, cover_contacts
 from .atlas.meshing import Mesh, shortest_edge
 from .atlas.object_atlas import Atlas, NextTouch
 from .atlas.touching import Progress, explore_object, touch_all_over
+from .contact_data.comments import UNIT_METERS
 from .contact_data.rows import Contacts
-from .contact_data.table import UNIT_METERS, contacts_from_csv, contacts_to_csv
+from .contact_data.table import contacts_from_csv, contacts_to_csv
 from .contours.common_point import common_point, in_running_order
 from .contours.contour import (
     CREASE,
