@@ -103,6 +103,7 @@ def _add_fit(add: Callable[..., Any]) -> None:
         metavar="MESH",
         help="put the patch onto this scanned mesh, .ply, .stl or .obj in the unit of the contacts",
     )
+    add("--target", default="", metavar="NAME", help="the mesh in that file (default: the only one)")
     _add_method(add)
     _add_verify(add)
 
@@ -170,7 +171,7 @@ def _add_target(add: Callable[..., Any]) -> None:
         "--target",
         default="",
         metavar="NAME",
-        help="object to touch (default: the active one, or the only mesh)",
+        help="object to touch (default: the active one of a .blend, or the only mesh)",
     )
 
 

@@ -102,7 +102,7 @@ def _arguments(options: argparse.Namespace) -> dict[str, Any]:
         if "point" in given:
             given["exact_point"] = json.dumps(given.pop("point"))
         return given | _open_contacts(options)
-    given["target"] = options.target or _default_target()
+    given["target"] = options.target or _default_target(options.file)
     if options.azimuths is not None:
         if not 3 <= len(options.azimuths) <= 6:
             raise Misuse(f"--azimuths: expected three to six, got {len(options.azimuths)}")
@@ -118,6 +118,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     """Opens the file, runs the operator, saves, and returns the report."""
     if "files" in options and options.verify is not None and options.onto is None:
         raise Misuse("--verify: expected --onto MESH too, the mesh to compare with")
+    if options.command == "fit" and options.target and options.onto is None:
+        raise Misuse("--target: expected --onto MESH too, the file that has this mesh")
     _require_outputs(options)
     if options.file is not None:
         mesh_file.open_file(options.file)
@@ -177,7 +179,7 @@ def _compare(patch: Object, options: argparse.Namespace) -> None:
     """Compares the patch with the mesh that was touched, or with the one onto which it is put."""
     target = None if "files" in options else bpy.data.objects[patch[patch_record.RECORD]["source"]]
     if options.onto is not None:
-        target = mesh_file.add(options.onto)
+        target = mesh_file.named(options.onto, mesh_file.add(options.onto), options.target)
         register_patch(patch, target, bpy.context.evaluated_depsgraph_get())
     if target is not None:
         verify_patch(patch, target, bpy.context.evaluated_depsgraph_get())
@@ -222,12 +224,15 @@ def _write_table(path: Path) -> int:
     return len(patches)
 
 
-def _default_target() -> str:
-    """The name of the scene's only mesh, if nothing else is active."""
+def _default_target(file: Path | None) -> str:
+    """The name of the scene's only mesh, if nothing else is active. Raises OSError if there are several."""
     if bpy.context.view_layer.objects.active is not None:
         return ""
-    meshes = [obj.name for obj in bpy.context.scene.objects if obj.type == "MESH"]
-    return meshes[0] if len(meshes) == 1 else ""
+    meshes = sorted(
+        (obj for obj in bpy.context.scene.objects if obj.type == "MESH"), key=lambda obj: obj.name
+    )
+    meshes = [obj for obj in meshes if len(obj.data.polygons)] or meshes
+    return mesh_file.named(file or Path(bpy.data.filepath or "scene"), meshes, "").name if meshes else ""
 
 
 def write(report: Mapping[str, Any], options: argparse.Namespace) -> None:
