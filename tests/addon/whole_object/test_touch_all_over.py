@@ -133,7 +133,7 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball, extension):
     assert (rows["Surface"], rows["Goes On At"]) == ("Incomplete", places)
     # Its far side does not show through where nothing was felt.
     assert not surface.show_in_front
-    assert surface.modifiers["Above the Mesh"].strength > 0.0
+    assert surface["tactile_above"] > 0.0
     # What was not felt is where the mesh is farthest from the surface.
     assert record["deviation_max"] > 1.0
     assert np.linalg.norm(record["deviation_place"]) == pytest.approx(2.0, abs=0.01)
