@@ -52,6 +52,7 @@ from .scan.pose_search import Pose, register
 from .scan.sampling import scattered, spaced, spaced_count
 from .scan.verification import reachable, verify, verifying
 
+__version__ = "0.1.0"  # That of blender_manifest.toml; python -m tools.release compares them.
 __all__ = [
     "CONTRADICTING",
     "CREASE",
