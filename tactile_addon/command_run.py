@@ -93,7 +93,7 @@ def _arguments(options: argparse.Namespace) -> dict[str, Any]:
     if options.degree is not None:
         given["degree"] = 0 if options.degree == "auto" else int(options.degree)
     if options.normal_std is not None:
-        given["normal_std"] = math.radians(options.normal_std)
+        given["normal_std"] = options.normal_std
     if "files" in options:
         if "location" in given:
             if "point" in given:
@@ -102,6 +102,7 @@ def _arguments(options: argparse.Namespace) -> dict[str, Any]:
         if "point" in given:
             given["exact_point"] = json.dumps(given.pop("point"))
         return given | _open_contacts(options)
+    given.pop("unit", None)
     given["target"] = options.target or _default_target(options.file)
     if options.azimuths is not None:
         if not 3 <= len(options.azimuths) <= 6:
@@ -123,6 +124,10 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     _require_outputs(options)
     if options.file is not None:
         mesh_file.open_file(options.file)
+    if "files" not in options and getattr(options, "unit", None) is not None:
+        if bpy.data.filepath or options.file is None:
+            raise Misuse("--unit: expected a .ply, .stl or .obj file, because a .blend names its own unit")
+        _set_unit(options.unit)
     if options.command == "table":
         return {"rows": _write_table(options.output)}
     arguments = _arguments(options)
@@ -190,12 +195,7 @@ def _open_contacts(options: argparse.Namespace) -> dict[str, Any]:
     if not bpy.data.filepath:
         bpy.ops.wm.read_homefile(use_empty=True)
         unit = measured.read(options.files, options.unit or "FILE", 1.0, options.command == "join").unit
-        settings: Any = bpy.context.scene.unit_settings
-        name = {symbol: name for name, (symbol, _) in METERS.items()}.get(unit)
-        settings.system = "METRIC" if unit else "NONE"
-        settings.scale_length = core.UNIT_METERS.get(unit, 1.0)
-        if name in ADAPTIVE["METRIC"]:
-            settings.length_unit = name
+        _set_unit(unit)
     paths = [path.absolute() for path in options.files]
     if len({path.parent for path in paths}) > 1:
         raise Misuse("FILE: expected files from one folder")
@@ -204,6 +204,16 @@ def _open_contacts(options: argparse.Namespace) -> dict[str, Any]:
         "directory": str(paths[0].parent),
         "files": [{"name": path.name} for path in paths],
     }
+
+
+def _set_unit(unit: str) -> None:
+    """Gives the scene a unit of core.UNIT_METERS, in which its numbers stay as they are, or none for ""."""
+    settings: Any = bpy.context.scene.unit_settings
+    name = {symbol: name for name, (symbol, _) in METERS.items()}.get(unit)
+    settings.system = "METRIC" if unit else "NONE"
+    settings.scale_length = core.UNIT_METERS.get(unit, 1.0)
+    if name in ADAPTIVE["METRIC"]:
+        settings.length_unit = name
 
 
 def _save(path: Path, made: Object) -> None:

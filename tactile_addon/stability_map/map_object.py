@@ -44,7 +44,7 @@ MAP_QUANTITIES = [
         "Factor by which plain least squares amplifies noise",
         0,
     ),
-    ("blind_share", "Blind Share", "Share of the shape terms that the planes cannot show", 0),
+    ("blind_share", "Blind Share", "Share of the ways to bend that the planes cannot show", 0),
     (REASON, "Reason", "Whether there is a patch, and why there is none", 0),
 ]
 LOGARITHMIC = ("condition_number",)  # These have a logarithmic scale from 1.

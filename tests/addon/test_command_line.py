@@ -242,6 +242,35 @@ def test_help(command):
     code, out, _ = command("reconstruct", "--help")
     assert code == 0
     assert "--azimuths" in out
+    code, out, _ = command("--help")
+    assert code == 0
+    assert "Touch meshes, or read measured contacts, and rebuild the surface." in " ".join(out.split())
+    assert "The words of" not in out
+
+
+def test_normals_have_the_same_unit_in_the_shell_and_in_files(command, empty, tmp_path):
+    rows = contacts_on_second(tmp_path / "second.csv").read_text().splitlines()[1:]
+    normals = [
+        ",".join(map(str, np.subtract([float(w) for w in row.split(",")[1:]], [6, 0, 0]))) for row in rows
+    ]
+    table = "\n".join(["curve,x,y,z,nx,ny,nz", *map(",".join, zip(rows, normals, strict=True))])
+    (tmp_path / "bare.csv").write_text(table)
+    (tmp_path / "noted.csv").write_text("# normal_std 0.02\n" + table)
+    found = []
+    for words in (["bare.csv", "--normal-std", "0.02"], ["noted.csv"]):
+        code, out, _ = command("fit", tmp_path / words[0], *words[1:], "--json", "-")
+        assert code == 0
+        found.append(json.loads(next(line for line in out.splitlines() if line.startswith("{"))))
+    assert found[0]["height_std"] == pytest.approx(found[1]["height_std"], rel=1e-6)
+
+
+def test_a_mesh_has_the_unit_that_is_named(command, files):
+    code, out, _ = command("reconstruct", files / "ball.ply", *PLACE, "--unit", "mm")
+    assert code == 0
+    assert re.search(r"^principal curvatures +-0\.\d+ .*1/mm", out, re.MULTILINE)
+    code, _, err = command("reconstruct", files / "ball.blend", *PLACE, "--unit", "mm")
+    assert code == 2
+    assert "--unit: expected a .ply, .stl or .obj file, because a .blend names its own unit" in err
 
 
 VERTICES = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.5], [2, 0, 0.5]]

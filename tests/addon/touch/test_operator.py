@@ -281,7 +281,7 @@ def test_the_default_is_the_accurate_fit(empty, ball):
     assert (report["method"], report["degree"]) == ("bayes", 4)
     assert report["vertex_distance_mean"] < 0.5 * tagc["vertex_distance_mean"]
     assert report["blind"] == 3
-    assert "These planes cannot show 3 of the 14 shape terms" in report["message"]
+    assert "These planes cannot show 3 of the 14 ways to bend" in report["message"]
 
 
 def test_degree_0_is_what_the_contacts_show(empty):
