@@ -13,8 +13,9 @@ from .atlas.measured import atlas_of, cover_contacts
 from .atlas.meshing import Mesh, shortest_edge
 from .atlas.object_atlas import Atlas, NextTouch
 from .atlas.touching import Progress, explore_object, touch_all_over
+from .contact_data.comments import UNIT_METERS
 from .contact_data.rows import Contacts
-from .contact_data.table import UNIT_METERS, contacts_from_csv, contacts_to_csv
+from .contact_data.table import contacts_from_csv, contacts_to_csv
 from .contours.common_point import common_point, in_running_order
 from .contours.contour import (
     CREASE,
@@ -51,6 +52,7 @@ from .scan.pose_search import Pose, register
 from .scan.sampling import scattered, spaced, spaced_count
 from .scan.verification import reachable, verify, verifying
 
+__version__ = "0.1.0"  # That of blender_manifest.toml; python -m tools.release compares them.
 __all__ = [
     "CONTRADICTING",
     "CREASE",

@@ -100,7 +100,7 @@ def felt():
 def write_contacts(path, seed=1):
     rng = np.random.default_rng(seed)
     lines = [
-        "# Tactile Patch contacts, version 2, lengths in mm",
+        "# Tactile Patch contacts, version 3, lengths in mm",
         f"# noise {NOISE}",
         "curve,x [mm],y [mm],z [mm],nx,ny,nz",
     ]

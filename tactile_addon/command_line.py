@@ -50,7 +50,10 @@ def main(args: Sequence[str]) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="blender -c tactile", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        prog="blender -c tactile",
+        description="Touch meshes, or read measured contacts, and rebuild the surface.",
+    )
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
     for name, add_arguments, help in (
         ("reconstruct", _add_reconstruct, "touch a mesh and rebuild the patch around a point"),
@@ -94,8 +97,8 @@ def _add_fit(add: Callable[..., Any]) -> None:
     add(
         "--normal-std",
         type=float,
-        metavar="DEGREES",
-        help="standard deviation of measured normals, to fit them too",
+        metavar="RADIANS",
+        help="standard deviation of measured normals, to fit them too (one degree is 0.0175)",
     )
     add(
         "--onto",
@@ -103,6 +106,7 @@ def _add_fit(add: Callable[..., Any]) -> None:
         metavar="MESH",
         help="put the patch onto this scanned mesh, .ply, .stl or .obj in the unit of the contacts",
     )
+    add("--target", default="", metavar="NAME", help="the mesh in that file (default: the only one)")
     _add_method(add)
     _add_verify(add)
 
@@ -110,10 +114,14 @@ def _add_fit(add: Callable[..., Any]) -> None:
 def _add_contacts(add: Callable[..., Any], help: str) -> None:
     """Adds the options of measured contacts."""
     add("files", nargs="+", type=Path, metavar="FILE", help=help)
-    add("--unit", choices=list(core.UNIT_METERS), help="unit of the numbers (the file's)")
+    _add_unit(add, "unit of the numbers (the file's)")
     add("--outward", **VECTOR, help="a direction on the outer side (default: by the normals)")
     add("--flip", action="store_true", default=None, help="use the other side as the outer one")
     add("--noise", type=float, help="noise floor: a contact has at least this standard deviation")
+
+
+def _add_unit(add: Callable[..., Any], help: str) -> None:
+    add("--unit", choices=list(core.UNIT_METERS), help=help)
 
 
 def _add_join(add: Callable[..., Any]) -> None:
@@ -170,8 +178,9 @@ def _add_target(add: Callable[..., Any]) -> None:
         "--target",
         default="",
         metavar="NAME",
-        help="object to touch (default: the active one, or the only mesh)",
+        help="object to touch (default: the active one of a .blend, or the only mesh)",
     )
+    _add_unit(add, "unit of a .ply, .stl or .obj file, for the report (unknown)")
 
 
 def _add_sensor(add: Callable[..., Any]) -> None:

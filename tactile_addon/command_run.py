@@ -93,7 +93,7 @@ def _arguments(options: argparse.Namespace) -> dict[str, Any]:
     if options.degree is not None:
         given["degree"] = 0 if options.degree == "auto" else int(options.degree)
     if options.normal_std is not None:
-        given["normal_std"] = math.radians(options.normal_std)
+        given["normal_std"] = options.normal_std
     if "files" in options:
         if "location" in given:
             if "point" in given:
@@ -102,7 +102,8 @@ def _arguments(options: argparse.Namespace) -> dict[str, Any]:
         if "point" in given:
             given["exact_point"] = json.dumps(given.pop("point"))
         return given | _open_contacts(options)
-    given["target"] = options.target or _default_target()
+    given.pop("unit", None)
+    given["target"] = options.target or _default_target(options.file)
     if options.azimuths is not None:
         if not 3 <= len(options.azimuths) <= 6:
             raise Misuse(f"--azimuths: expected three to six, got {len(options.azimuths)}")
@@ -118,9 +119,15 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     """Opens the file, runs the operator, saves, and returns the report."""
     if "files" in options and options.verify is not None and options.onto is None:
         raise Misuse("--verify: expected --onto MESH too, the mesh to compare with")
+    if options.command == "fit" and options.target and options.onto is None:
+        raise Misuse("--target: expected --onto MESH too, the file that has this mesh")
     _require_outputs(options)
     if options.file is not None:
         mesh_file.open_file(options.file)
+    if "files" not in options and getattr(options, "unit", None) is not None:
+        if bpy.data.filepath or options.file is None:
+            raise Misuse("--unit: expected a .ply, .stl or .obj file, because a .blend names its own unit")
+        _set_unit(options.unit)
     if options.command == "table":
         return {"rows": _write_table(options.output)}
     arguments = _arguments(options)
@@ -177,7 +184,7 @@ def _compare(patch: Object, options: argparse.Namespace) -> None:
     """Compares the patch with the mesh that was touched, or with the one onto which it is put."""
     target = None if "files" in options else bpy.data.objects[patch[patch_record.RECORD]["source"]]
     if options.onto is not None:
-        target = mesh_file.add(options.onto)
+        target = mesh_file.named(options.onto, mesh_file.add(options.onto), options.target)
         register_patch(patch, target, bpy.context.evaluated_depsgraph_get())
     if target is not None:
         verify_patch(patch, target, bpy.context.evaluated_depsgraph_get())
@@ -188,12 +195,7 @@ def _open_contacts(options: argparse.Namespace) -> dict[str, Any]:
     if not bpy.data.filepath:
         bpy.ops.wm.read_homefile(use_empty=True)
         unit = measured.read(options.files, options.unit or "FILE", 1.0, options.command == "join").unit
-        settings: Any = bpy.context.scene.unit_settings
-        name = {symbol: name for name, (symbol, _) in METERS.items()}.get(unit)
-        settings.system = "METRIC" if unit else "NONE"
-        settings.scale_length = core.UNIT_METERS.get(unit, 1.0)
-        if name in ADAPTIVE["METRIC"]:
-            settings.length_unit = name
+        _set_unit(unit)
     paths = [path.absolute() for path in options.files]
     if len({path.parent for path in paths}) > 1:
         raise Misuse("FILE: expected files from one folder")
@@ -202,6 +204,16 @@ def _open_contacts(options: argparse.Namespace) -> dict[str, Any]:
         "directory": str(paths[0].parent),
         "files": [{"name": path.name} for path in paths],
     }
+
+
+def _set_unit(unit: str) -> None:
+    """Gives the scene a unit of core.UNIT_METERS, in which its numbers stay as they are, or none for ""."""
+    settings: Any = bpy.context.scene.unit_settings
+    name = {symbol: name for name, (symbol, _) in METERS.items()}.get(unit)
+    settings.system = "METRIC" if unit else "NONE"
+    settings.scale_length = core.UNIT_METERS.get(unit, 1.0)
+    if name in ADAPTIVE["METRIC"]:
+        settings.length_unit = name
 
 
 def _save(path: Path, made: Object) -> None:
@@ -222,12 +234,15 @@ def _write_table(path: Path) -> int:
     return len(patches)
 
 
-def _default_target() -> str:
-    """The name of the scene's only mesh, if nothing else is active."""
+def _default_target(file: Path | None) -> str:
+    """The name of the scene's only mesh, if nothing else is active. Raises OSError if there are several."""
     if bpy.context.view_layer.objects.active is not None:
         return ""
-    meshes = [obj.name for obj in bpy.context.scene.objects if obj.type == "MESH"]
-    return meshes[0] if len(meshes) == 1 else ""
+    meshes = sorted(
+        (obj for obj in bpy.context.scene.objects if obj.type == "MESH"), key=lambda obj: obj.name
+    )
+    meshes = [obj for obj in meshes if len(obj.data.polygons)] or meshes
+    return mesh_file.named(file or Path(bpy.data.filepath or "scene"), meshes, "").name if meshes else ""
 
 
 def write(report: Mapping[str, Any], options: argparse.Namespace) -> None:

@@ -13,7 +13,6 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
@@ -34,22 +33,6 @@ ELSEWHERE += (
     "python -m cluster ",
     "blender --background scene.blend --python examples/",
 )
-RADIUS, TOP = 20.0, np.array([0.0, 0.0, 20.0])  # of the ball that the contacts are on
-
-
-def curves():
-    """Three arrays of contacts on the ball, through its top; and the normals there."""
-    s = np.linspace(-0.4, 0.4, 21)[:, None]
-    for azimuth in np.radians([0.0, 60.0, 120.0]):
-        way = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-        normals = np.sin(s) * way + np.cos(s) * [0.0, 0.0, 1.0]
-        yield RADIUS * normals, normals
-
-
-def rows():
-    """Contacts (n, 3) all around the top."""
-    x, y = (v.ravel() for v in np.meshgrid(np.linspace(-9.0, 9.0, 25), np.linspace(-9.0, 9.0, 12)))
-    return np.column_stack([x, y, np.sqrt(RADIUS**2 - x**2 - y**2)])
 
 
 def suzanne(bpy):
@@ -73,21 +56,6 @@ def folder(empty, tmp_path, monkeypatch):
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     suzanne(empty)
     return tmp_path
-
-
-def names(page):
-    """The variables that Python samples leave to the reader."""
-    pairs = list(curves())
-    measured = pairs if page.endswith("contact_data.md") else [points for points, _ in pairs]
-    contours = [core.Contour(points) for points, _ in pairs]
-    return {
-        "measured": measured,
-        "contours": contours,
-        "point": TOP,
-        "place": TOP,
-        "rows": rows(),
-        "matrix": np.diag([2.0, 2.0, 2.0, 1.0]),
-    }
 
 
 def commands(code):
@@ -136,7 +104,7 @@ def assert_printed(shown, out):
 @pytest.mark.long
 @pytest.mark.parametrize("page", PAGES)
 def test_samples_run(page, empty, command, folder):
-    scope, out = names(page), None
+    scope, out = {}, None
     for kind, code in PAGES[page]:
         if "trimesh" in code and not find_spec("trimesh"):  # It is a peer of the charts only.
             continue

@@ -175,3 +175,12 @@ def test_the_lesson_shows_what_core_finds():
     lesson = pytest.importorskip("tools.lesson", reason="needs matplotlib: make chart installs it")
     for curvatures in lesson.SHAPES.values():
         assert lesson.felt(*curvatures) == pytest.approx(curvatures, abs=0.03)
+
+
+def test_no_two_lines_for_the_shell_write_the_same_file():
+    pages = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+    lines = [line for page in pages for line in page.read_text(encoding="utf-8").splitlines()]
+    lines = [line.strip() for line in lines if re.match(r" *blender .*-c tactile ", line)]
+    options = r" --(?:output|report|verify|json|contacts) (\S+)"
+    written = [name for line in dict.fromkeys(lines) for name in re.findall(options, line) if name != "-"]
+    assert sorted(written) == sorted(set(written))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+import core
 from tools import build, check_site, release
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -26,6 +27,8 @@ def checkout(tmp_path):
     """A checkout whose version, changelog, citation and tag agree on 1.2.0."""
     (tmp_path / "blender_manifest.toml").write_text('version = "1.2.0"\n')
     (tmp_path / "CITATION.cff").write_text("title: T\nversion: 1.2.0\n")
+    (tmp_path / "core").mkdir()
+    (tmp_path / "core" / "__init__.py").write_text('"""C."""\n__version__ = "1.2.0"\n')
     (tmp_path / "CHANGELOG.md").write_text(CHANGES.format("2026-11-22"))
     (tmp_path / "pyproject.toml").write_text("[project.urls]\n" + "".join(f'{n} = "{a}"\n' for n, a in URLS))
     (tmp_path / "README.md").write_text(" ".join(address for _, address in URLS))
@@ -53,6 +56,7 @@ def test_what_agrees_can_be_released(checkout):
             "section [Unreleased]: move",
         ),
         ("CITATION.cff", "version: 1.1.0\n", "has another version than the manifest's 1.2.0"),
+        ("core/__init__.py", '\n__version__ = "1.1.0"\n', "another __version__ than the manifest's 1.2.0"),
         ("blender_manifest.toml", 'version = "1.2"\n', "expected three numbers"),
         ("blender_manifest.toml", 'version = "1.3.0"\n', "no tag v1.3.0: git tag v1.3.0"),
         (
@@ -79,6 +83,10 @@ def test_an_empty_section_of_what_is_not_released_may_stay(checkout):
 def test_a_commit_after_the_tag_is_no_release(checkout):
     git(checkout, "commit", "--allow-empty", "--message", "More")
     assert list(release.disagreements(checkout)) == ["this commit has no tag v1.2.0: git tag v1.2.0"]
+
+
+def test_the_core_of_this_checkout_has_the_version_of_the_manifest():
+    assert core.__version__ == release.manifest_version(ROOT)
 
 
 def test_the_changelog_of_this_checkout_begins_with_the_version_of_the_manifest():

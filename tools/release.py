@@ -73,6 +73,8 @@ def disagreements(root: Path) -> Iterator[str]:
         yield f"CHANGELOG.md has changes in its section [Unreleased]: move them to [{version}]"
     if f"\nversion: {version}\n" not in (root / "CITATION.cff").read_text(encoding="utf-8"):
         yield f"CITATION.cff has another version than the manifest's {version}: change it"
+    if f'\n__version__ = "{version}"' not in (root / "core" / "__init__.py").read_text(encoding="utf-8"):
+        yield f"core/__init__.py has another __version__ than the manifest's {version}: change it"
     yield from unpublished(root)
     if git(root, "status", "--porcelain"):
         yield "there are changes that are not committed: commit them"

@@ -185,6 +185,8 @@ def snapped_to_border(mesh: Mesh, border: Border) -> Mesh:
     mesh = mesh.chosen(~out[mesh.triangles].any(axis=1))
     for _ in range(EARS):
         mesh = mesh.chosen(mesh.sides_on_border < 2)
+    if not len(mesh.border):  # Nothing is left of a small mesh.
+        return mesh
     at, _, _, toward, _ = _rim_of(mesh)
     vertices = mesh.vertices.copy()
     feet, ways = _feet(border, vertices[at])
@@ -228,8 +230,8 @@ def _feet(border: Border, points: Array) -> tuple[Array, Array]:
     from scipy.spatial import cKDTree
 
     segments = border.segments
-    near = cKDTree(segments.mean(axis=1)).query(points, min(NEAREST, len(segments)))[1]
-    near = near.reshape(len(points), -1)
+    count = min(NEAREST, len(segments))
+    near = cKDTree(segments.mean(axis=1)).query(points, count)[1].reshape(len(points), count)
     a, along = segments[near, 0], segments[near, 1] - segments[near, 0]
     shares = row_dot(points[:, None] - a, along) / np.maximum(row_dot(along, along), LEAST_DIVISOR)
     feet = a + np.clip(shares, 0.0, 1.0)[..., None] * along

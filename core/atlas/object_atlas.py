@@ -378,7 +378,8 @@ class Atlas:
     def meshing(self, edge: float) -> Generator[float, None, Mesh]:
         """Makes the `mesh` in steps: yields the share that is done, and returns the mesh.
 
-        Raises ValueError for edges that are longer than the object, or take too much memory.
+        Raises ValueError for edges that are longer than the object, that make no triangle, or that take
+        too much memory.
         """
         edge, indicator = number("edge", edge, above=0.0), self.reference.indicator
         if edge > indicator.size:
@@ -395,7 +396,10 @@ class Atlas:
         mesh, _ = yield from meshed(
             self.charts, indicator, edge, self.reference.ended, self.contacts and self.contacts.off
         )
-        return mesh if self.border is None else snapped_to_border(mesh, self.border)
+        mesh = mesh if self.border is None else snapped_to_border(mesh, self.border)
+        if not len(mesh.triangles):
+            raise ValueError(f"edge: expected one for which there is room, got {edge:.3g}: use a shorter one")
+        return mesh
 
     def to_dict(self) -> dict[str, Any]:
         """The graph as JSON has it: a dict of numbers, words, lists and dicts, in the caller's unit.

@@ -4,6 +4,7 @@
 
 import csv
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
@@ -14,6 +15,8 @@ from ..arguments import LARGEST, Array
 from ..contours.contour import Contour
 
 POINT_COLUMNS, NORMAL_COLUMNS = ("x", "y", "z"), ("nx", "ny", "nz")
+THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")  # The comma may be decimal or that of thousands.
+COMMENT_MARKS = ("#", "//")
 LETTERS_AT_ONCE = 1 << 16  # This many letters are read together.
 LONGEST_LINE = 1 << 20  # Lines have at most this many letters, for the words of one take 80 times its memory.
 
@@ -73,7 +76,7 @@ def header_of(text: str) -> tuple[str, int, int] | None:
 def is_row(line: str) -> bool:
     """Whether a line has fields, and is neither blank nor a comment."""
     words = line.lstrip()
-    return bool(words) and not words.startswith("#")
+    return bool(words) and not words.startswith(COMMENT_MARKS)
 
 
 class RowReader:
@@ -89,13 +92,14 @@ class RowReader:
         self._keys = [key for key in (*POINT_COLUMNS, *NORMAL_COLUMNS, "time") if key in columns]
         self._curves: dict[str, int] = {}  # The curves by their labels,
         self._measured: dict[str, bool] = {}  # and whether they have normals.
+        self._with_comma, self._is_decimal = "", False  # A number, and whether a comma is surely decimal.
         self._numbers, self._labels = [np.empty((0, len(self._keys)))], [np.empty(0, dtype=np.intp)]
 
     def add(self, number: int, block: str) -> None:
         """Adds lines from this number on. Raises ValueError with line and column if one is no contact."""
         try:
             labels, numbers = self._parse_block(block)
-        except (ValueError, csv.Error):  # A row is blank, short, without a normal, or wrong.
+        except ValueError:  # A row is blank, short, without a normal, or wrong.
             labels, numbers = self._parse_lines(number, block)
         ids = [self._curves.setdefault(label, len(self._curves)) for label in labels]
         self._labels.append(np.array(ids, dtype=np.intp))
@@ -111,6 +115,12 @@ class RowReader:
         numbers, labels = np.vstack(self._numbers), np.concatenate(self._labels)
         if not len(numbers):
             raise ValueError(f"{self._name}: expected contacts below the header, got none")
+        if self._with_comma and not self._is_decimal:
+            raise ValueError(
+                f"{self._name}: expected decimal commas or those of thousands, got numbers that may have "
+                f'either, such as "{self._with_comma}": write decimal points, or leave out the commas of '
+                "thousands"
+            )
         return contours(
             self._name,
             labels,
@@ -125,11 +135,12 @@ class RowReader:
 
         Raises ValueError without a message if any row needs `_parse_lines`: blank, short, mixed or malformed.
         """
-        lines = filter(is_row if "#" in block else str.strip, block.split("\n"))
+        commented = any(mark in block for mark in COMMENT_MARKS)
+        lines = filter(is_row if commented else str.strip, block.split("\n"))
         if '"' in block:
-            rows = [next(csv.reader([line], delimiter=self._separator)) for line in lines]
+            rows = [fields_of("", line, self._separator) for line in lines]
         else:
-            rows = [line.split(self._separator) for line in lines]
+            rows = [line.split(self._separator.strip(" ") or None) for line in lines]
         columns = list(zip(*rows, strict=True))
         if rows and len(columns) != self._width:
             raise ValueError
@@ -139,6 +150,7 @@ class RowReader:
         numbers = np.empty((len(rows), len(self._keys)))
         for i, key in enumerate(self._keys if rows else ()):
             numbers[:, i] = numbers_of(columns[self._columns[key]])
+            self._note_commas(columns[self._columns[key]])
         measured, distinct = "nx" in self._columns, set(labels)
         mixed = any(self._measured.setdefault(label, measured) is not measured for label in distinct)
         if mixed or "" in distinct or np.abs(numbers[:, :3]).max(initial=0.0) > LARGEST:
@@ -176,7 +188,15 @@ class RowReader:
 
     def _value(self, at: str, row: Mapping[str, str], key: str) -> float:
         """The number in the column `key` of a row. Raises ValueError that names place and column."""
+        self._note_commas([row[key]])
         return number_of(f'{at}, column "{key}"', row[key], LARGEST if key in POINT_COLUMNS else math.inf)
+
+    def _note_commas(self, words: Sequence[str]) -> None:
+        """Looks for a comma in numbers, until one can only be decimal."""
+        if not self._is_decimal and "," in "".join(words):
+            for word in (word.strip() for word in words if "," in word):
+                self._with_comma = word
+                self._is_decimal = self._is_decimal or THOUSANDS.fullmatch(word) is None
 
 
 def contours(
@@ -209,6 +229,7 @@ def contours(
 
 def fields_of(at: str, line: str, separator: str) -> list[str]:
     """The fields of a line, without spaces around them. Raises ValueError that names the place `at`."""
+    line = " ".join(line.split()) if separator == " " else line
     try:
         (fields,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
     except csv.Error:

@@ -5,30 +5,25 @@
 import csv
 import io
 import itertools
+import re
 from dataclasses import replace
 from typing import Any
 
-from ..arguments import LARGEST
 from ..contours.contour import Contour
 from . import rows
+from .comments import (
+    CURVE_KEYS,
+    FORMAT_VERSION,
+    NO_UNIT,
+    TITLE,
+    UNIT_METERS,
+    comments,
+    spelled,
+    stated,
+    unit_named,
+)
 from .rows import NORMAL_COLUMNS, POINT_COLUMNS, Contacts
 
-FORMAT_VERSION = 3
-WITHOUT_BALL = 2  # Files without a ball have the version that earlier releases read, too.
-TITLE = "# Tactile Patch contacts, version "
-# The length of each unit in meters.
-UNIT_METERS = {
-    "km": 1e3,
-    "m": 1.0,
-    "cm": 1e-2,
-    "mm": 1e-3,
-    "µm": 1e-6,
-    "mi": 1609.344,
-    "ft": 0.3048,
-    "in": 0.0254,
-    "thou": 2.54e-5,
-}
-VECTOR_KEYS, CURVE_KEYS = ("point", "outward"), ("noise", "normal_std", "ball")  # Keys of the comments.
 COLUMNS = ("curve", "time", *POINT_COLUMNS, *NORMAL_COLUMNS)
 STROKE = "stroke"  # The names of curves that do not pass through the reference point begin with this.
 
@@ -44,8 +39,8 @@ def contacts_from_csv(text: str, name: str = "the table") -> Contacts:
     """
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     rows.require_short_lines(name, text)
-    metadata = _metadata(name, text)
-    table = _table(name, text)
+    unit, metadata = stated(name, text)
+    table = _table(name, text, unit)
     contours = table.contours()
     for key in CURVE_KEYS:
         stds = metadata.pop(key, [None])
@@ -72,8 +67,7 @@ def contacts_to_csv(contacts: Contacts) -> str:
     contours = [*contours, *strokes]
     names = POINT_COLUMNS + (NORMAL_COLUMNS if any(c.normals is not None for c in contours) else ())
     text = io.StringIO()
-    version = WITHOUT_BALL if all(contour.ball is None for contour in contours) else FORMAT_VERSION
-    print(f"{TITLE}{version}, lengths in {unit or 'no unit'}", file=text)
+    print(f"# {TITLE}, version {FORMAT_VERSION}, lengths in {unit or NO_UNIT}", file=text)
     for key, values in {"point": point, "outward": outward, **_curve_metadata(contours)}.items():
         if values is not None:
             print("#", key, *("-" if value is None else repr(value) for value in values), file=text)
@@ -85,19 +79,46 @@ def contacts_to_csv(contacts: Contacts) -> str:
     return text.getvalue()
 
 
-def _table(name: str, text: str) -> rows.RowReader:
-    """The header's columns and all rows of a text."""
-    found = rows.header_of(text)
-    if found is None:
-        raise ValueError(f"{name}: expected a header with the columns curve, x, y, z, got an empty file")
-    header, number, start = found
+def _table(name: str, text: str, unit: str) -> rows.RowReader:
+    """The header's columns and all rows of a text whose title names this unit, or "" if none does."""
+    header, number, start = _header(name, text)
     at = f"{name}, line {number}"
-    separator = next((s for s in ";\t" if s in header), ",")
-    width, columns, unit = _columns(at, rows.fields_of(at, header, separator))
-    table = rows.RowReader(name, separator, width, columns, unit)
+    separator = _separator(header)
+    if separator == " ":
+        header = re.sub(r"\s+(?=[\[(])", "", header)  # The unit belongs to the column before it.
+    width, columns, of_columns = _columns(at, rows.fields_of(at, header, separator))
+    if unit and of_columns not in ("", unit):
+        raise ValueError(f"{at}: expected lengths in {unit}, as the title says, got {of_columns}")
+    table = rows.RowReader(name, separator, width, columns, of_columns or unit)
     for _, first, block in rows.blocks(text, start, number + 1):
         table.add(first, block)
     return table
+
+
+def _header(name: str, text: str) -> tuple[str, int, int]:
+    """The line with the columns, its number, and the place of the next line.
+
+    This is the first row, or else the last comment above it that names x, y and z.
+    """
+    found = rows.header_of(text)
+    if found is None or not _names_points(found[0]):
+        above = text if found is None else text[: found[2]]
+        titles = [(line, number, end) for number, line, end in comments(above) if _names_points(line)]
+        found = titles[-1] if titles else found
+    if found is None:
+        raise ValueError(f"{name}: expected a header with the columns curve, x, y, z, got an empty file")
+    return found
+
+
+def _names_points(line: str) -> bool:
+    """Whether the fields of a line name the columns x, y and z."""
+    titles = line.lower().split(_separator(line).strip(" ") or None)
+    return {*POINT_COLUMNS} <= {_name_and_unit(title.strip(' "'))[0] for title in titles}
+
+
+def _separator(header: str) -> str:
+    """What separates the fields of a table with this header."""
+    return next((mark for mark in ";\t|," if mark in header), " ")
 
 
 def _curve_metadata(contours: list[Contour]) -> dict[str, list[float | None]]:
@@ -131,50 +152,6 @@ def _with(name: str, contour: Contour, key: str, std: float | None) -> Contour:
         raise ValueError(f"{name}: {error}") from None
 
 
-def _metadata(name: str, text: str) -> dict[str, Any]:
-    """The values in the comments of a text that `contacts_to_csv` has written, by key; {} for others."""
-    if not text.startswith(TITLE):
-        return {}
-    metadata: dict[str, Any] = {}
-    start, number, version = 0, 1, 0
-    while text.startswith("#", start):
-        end = text.find("\n", start) + 1 or len(text)
-        at, line = f"{name}, line {number}", text[start:end]
-        if number == 1:
-            version = _version(at, line.removeprefix(TITLE).partition(",")[0].strip())
-        key, *words = line[1:].rstrip(",;\t\n ").split() or [""]  # A spreadsheet may leave separators behind.
-        if key == "ball" and version <= WITHOUT_BALL:
-            raise ValueError(
-                f"{at}: expected no ball in a file of version {version}: make it {FORMAT_VERSION}"
-            )
-        if key in VECTOR_KEYS and len(words) != 3:
-            raise ValueError(f"{at}: expected 3 numbers for {key}, got {len(words)}")
-        if key in VECTOR_KEYS:
-            metadata[key] = [rows.number_of(f'{at}, "{key}"', word, LARGEST) for word in words]
-        elif key in CURVE_KEYS:
-            metadata[key] = [_nonnegative_or_none(f'{at}, "{key}"', word) for word in words]
-        start, number = end, number + 1
-    return metadata
-
-
-def _nonnegative_or_none(at: str, word: str) -> float | None:
-    """The number of 0 or more in a word, or None for "-"."""
-    std = None if word == "-" else rows.number_of(at, word, LARGEST)
-    if std is not None and std < 0.0:
-        raise ValueError(f"{at}: expected a number of 0 or more, got {word[:40]}")
-    return std
-
-
-def _version(at: str, version: str) -> int:
-    """The version of the format. Raises ValueError for one that is not known."""
-    if not version.isdecimal() or int(version) > FORMAT_VERSION:
-        raise ValueError(
-            f"{at}: expected version {FORMAT_VERSION} or less, got {version[:40]}: this was written by a "
-            "later release"
-        )
-    return int(version)
-
-
 def _columns(at: str, header: list[str]) -> tuple[int, dict[str, int], str]:
     """The number of columns, the place of each known one by name, and the unit of the coordinates."""
     columns: dict[str, int] = {}
@@ -183,15 +160,13 @@ def _columns(at: str, header: list[str]) -> tuple[int, dict[str, int], str]:
         key, bracketed, suffix = _name_and_unit(title.lower())
         if key not in COLUMNS:
             continue
-        unit = (bracketed or suffix).replace("μ", "µ")
-        unit = "µm" if unit == "um" else unit
-        if key in POINT_COLUMNS and unit and unit not in UNIT_METERS:
-            if suffix:  # Columns such as x_offset are not coordinates.
+        if key in POINT_COLUMNS:
+            if suffix and spelled(suffix) not in UNIT_METERS:  # Such as x_offset, which is no coordinate.
                 continue
-            raise ValueError(f'{at}: expected a unit out of {", ".join(UNIT_METERS)}, got "{unit}"')
+            found[key] = unit_named(at, bracketed or suffix)
         if key in columns:
             raise ValueError(f'{at}: expected one column "{key}", got two')
-        columns[key], found[key] = i, unit
+        columns[key] = i
     missing = [key for key in POINT_COLUMNS if key not in columns]
     missing += [
         key for key in NORMAL_COLUMNS if key not in columns and any(k in columns for k in NORMAL_COLUMNS)
@@ -199,8 +174,11 @@ def _columns(at: str, header: list[str]) -> tuple[int, dict[str, int], str]:
     if missing:
         text = ", ".join(header)
         text = text if len(text) < 60 else f"{text[:57]}..."
-        raise ValueError(f'{at}: expected the column "{missing[0]}", got "{text}"')
-    used = {found[key] for key in POINT_COLUMNS}
+        raise ValueError(
+            f'{at}: expected the column "{missing[0]}", got "{text}": put commas, semicolons, tabs, "|" or '
+            "spaces between the columns curve, x, y, z"
+        )
+    used = set(found.values())
     if len(used) > 1:
         raise ValueError(f"{at}: expected x, y and z in one unit, got {' and '.join(sorted(used))}")
     return len(header), columns, used.pop()

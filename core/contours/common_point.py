@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import LARGEST, Array, finite_array, list_of, many
-from .contour import Contour
+from ..arguments import LARGEST, Array, finite_array, many
+from .contour import Contour, contours_of
 from .curves import (
     LEAST_CONTACTS,
     WINDOW,
@@ -28,8 +28,10 @@ MAX_QUERIES = 10**6  # and among this many distances of a contact from a curve.
 CONTACTS_AROUND = 4 * WINDOW  # This many contacts of a curve are looked at around a point.
 
 
-def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
+def common_point(contours: Sequence[ArrayLike | Contour]) -> tuple[Array, Array]:
     """The point (3,) with the least sum of squared distances to two or more curves, and the distances (c,).
+
+    contours : Contours or arrays (n, 3)
 
     Curves that were measured one by one do not meet exactly: the distances are by how much each misses the
     point. If curves meet twice, as sections of a body do, it is the better of the two points.
@@ -37,7 +39,7 @@ def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
     Raises ValueError for bad arguments, DegenerateCurvesError for curves with fewer than four contacts,
     that do not come near each other, or that run in the same direction where they do.
     """
-    found = list_of("contours", contours, Contour)
+    found = contours_of("contours", contours)
     if len(found) < 2:
         raise DegenerateCurvesError(
             f"the common point needs two or more curves, got {len(found)}: name the curve of each contact in "
@@ -50,10 +52,10 @@ def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
                 "needed to tell where it runs: measure more, or give the reference point"
             )
     origin = found[0].points[0]  # Far from the world's origin only differences of points are exact.
-    contours = [Contour(contour.points - origin) for contour in found]
-    refined = (_refined(start, contours) for start in _starts(contours))
+    curves = [Contour(contour.points - origin) for contour in found]
+    refined = (_refined(start, curves) for start in _starts(curves))
     point, tangents, misses = min(refined, key=lambda fit: float(np.sum(fit[2] ** 2)))
-    _require_near(point, misses, contours)
+    _require_near(point, misses, curves)
     _require_crossing(tangents)
     return origin + point, misses
 

@@ -18,6 +18,7 @@ from ..arguments import (
     number,
     shown,
     unit_vector,
+    unit_vectors,
 )
 
 # Coordinates that are rounded by more than this share of a curve's size do not show curvature.
@@ -173,6 +174,32 @@ class Contour:
             noise=None if self.noise is None else scale * self.noise,
             ball=None if self.ball is None else scale * self.ball,
         )
+
+
+def contours_of(name: str, given: Sequence[ArrayLike | Contour]) -> list[Contour]:
+    """The Contours of a list of Contours and arrays (n, 3). Raises ValueError with its `name`."""
+    found = []
+    for i, each in enumerate(list_of(name, given, object)):  # type: ignore[arg-type]
+        try:
+            found.append(each if isinstance(each, Contour) else Contour(each))  # type: ignore[arg-type]
+        except ValueError as error:
+            raise ValueError(f"{name}[{i}]: {str(error).removeprefix('points: ')}") from None
+    return found
+
+
+def outward_of(outward: ArrayLike | None, felt: Iterable[object]) -> Array:
+    """The unit vector (3,) to the outer side: as given, or that of the mean normal of Contours among `felt`.
+
+    Raises ValueError if it is None and no normal was measured.
+    """
+    if outward is not None:
+        return unit_vector("outward", outward)
+    normals = [each.normals for each in felt if isinstance(each, Contour) and each.normals is not None]
+    directions = np.vstack([np.empty((0, 3)), *normals])
+    mean = unit_vectors("normals", directions[directions.any(axis=1)]).sum(axis=0)
+    if not mean.any():
+        raise ValueError("outward: expected a direction, because no contact has a normal, got None")
+    return unit_vector("outward", mean)
 
 
 def read_only(array: Array) -> Array:

@@ -14,6 +14,7 @@ from .domain import GRID, Domain
 from .monge import HeightField
 
 SIMILARITY_TOLERANCE = 1e-4  # A similarity in single precision may be off by so much.
+POINTS_AT_ONCE = 20_000  # Distances of so many points take some 50 MB; those of millions took gigabytes.
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +77,9 @@ def fit_error(surface: HeightField, points: ArrayLike) -> float:
 def distances(surface: HeightField, points: ArrayLike) -> Array:
     """Euclidean distances (n,) of local points (n, 3) to the surface."""
     local = finite_array("points", points, (None, 3))
-    return np.linalg.norm(surface.closest_point(local) - local, axis=1)
+    parts = [local[i : i + POINTS_AT_ONCE] for i in range(0, len(local), POINTS_AT_ONCE)]
+    off = [np.linalg.norm(surface.closest_point(part) - part, axis=1) for part in parts]
+    return np.concatenate([np.empty(0), *off])
 
 
 def total_absolute_curvature(surface: HeightField, domain: Domain) -> float:

@@ -14,9 +14,8 @@ from ..arguments import (
     Array,
     finite_array,
     list_of,
-    unit_vector,
 )
-from ..contours.contour import Contour
+from ..contours.contour import Contour, contours_of, outward_of
 from ..contours.curves import has_measured_normals
 from ..contours.local_geometry import DegenerateCurvesError
 from .ball import ball_of, center_at, contacts_below
@@ -31,9 +30,9 @@ STACK = 4000  # The number of contacts that fit into a processor's cache at once
 
 def reconstruct(
     point: ArrayLike,
-    contours: Sequence[Contour],
+    contours: Sequence[ArrayLike | Contour],
     *,
-    outward: ArrayLike,
+    outward: ArrayLike | None = None,
     strokes: Sequence[ArrayLike | Contour] = (),
     radius: float | None = None,
     method: str = "bayes",
@@ -45,9 +44,10 @@ def reconstruct(
 ) -> Reconstruction:
     """The surface patch around `point` from three or more contours through it, from strokes, or from both.
 
-    point : (3,); outward : (3,), on the outer side of the surface. If the contours are those of a
-        ball's center, the patch is that of the contacts, and the point is a center or, if no center is
-        nearer to it than half the ball's radius, a contact
+    point : (3,). If the contours are those of a ball's center, the patch is that of the contacts, and the
+        point is a center or, if no center is nearer to it than half the ball's radius, a contact
+    contours : Contours, or arrays (n, 3)
+    outward : (3,), on the outer side of the surface; None for the side of the mean of the measured normals
     strokes : curves that do not pass through the point, (n, 3) each or Contours, in the order in which their
       contacts were felt, either way; their normals are not fitted. Only "bayes" fits them. With contours,
       contacts beyond the domain are ignored. Without contours the point is only a place: the origin is its
@@ -73,23 +73,26 @@ def reconstruct(
     >>> round(r.patch.k1, 2), round(r.patch.k2, 2), r.status
     (-1.0, -1.0, 'ok')
     """
-    p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
+    p, felt = finite_array("point", point, (3,), LARGEST), contours_of("contours", contours)
     options = FitOptions(method, degree, noise, point_std, weight, solver, radius)
-    p, touch = _touch(p, list_of("contours", contours, Contour), strokes, up, options)
+    others: list[Any] = list_of("strokes", strokes, object)  # type: ignore[arg-type]
+    up = outward_of(outward, [*felt, *others])
+    p, touch = _touch(p, felt, others, up, options)
     return _fitted_one(p, touch, up, options)
 
 
 def reconstruct_many(
     points: ArrayLike,
-    contours_list: Sequence[Sequence[Contour]],
+    contours_list: Sequence[Sequence[ArrayLike | Contour]],
     *,
-    outward: ArrayLike,
+    outward: ArrayLike | None = None,
     strokes_list: Sequence[Sequence[ArrayLike | Contour]] | None = None,
     **options: Any,
 ) -> list[Reconstruction | DegenerateCurvesError]:
     """What `reconstruct` gives for each of n touches, in stacks, in which "bayes" is several times as fast.
 
-    points : (n, 3); contours_list : n lists of contours; outward : (n, 3); strokes_list : n lists of strokes
+    points : (n, 3); contours_list : n lists of contours; strokes_list : n lists of strokes
+    outward : (n, 3), or None for the sides of the measured normals
     options : the other keywords of `reconstruct`
 
     A touch that cannot carry the method is returned as its DegenerateCurvesError. Raises
@@ -102,13 +105,15 @@ def reconstruct_many(
     for name, given in (("contours_list", lists), ("strokes_list", strokes)):
         if len(given) != len(p):
             raise ValueError(f"{name}: expected {len(p)} lists of {name[:-5]}, got {len(given)}")
-    up = finite_array("outward", outward, (len(p), 3))
-    up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
+    felt = [contours_of("contours", contours) for contours in lists]
+    given_up = [None] * len(p) if outward is None else finite_array("outward", outward, (len(p), 3))
+    up = np.array([outward_of(u, [*c, *s]) for u, c, s in zip(given_up, felt, strokes, strict=True)])
+    up = up.reshape(-1, 3)
     found: dict[int, Reconstruction | DegenerateCurvesError] = {}
     touches, places = {}, p.copy()
-    for i, (c, s) in enumerate(zip(lists, strokes, strict=True)):
+    for i, (c, s) in enumerate(zip(felt, strokes, strict=True)):
         try:
-            places[i], touches[i] = _touch(p[i], list_of("contours", c, Contour), s, up[i], fit)
+            places[i], touches[i] = _touch(p[i], c, s, up[i], fit)
         except DegenerateCurvesError as error:
             found[i] = error
     each = list(touches)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import LARGEST, SMALLEST, finite_array, number, shown
+from ..arguments import LARGEST, SMALLEST, Array, finite_array, number, shown
 from ..bayes.kernel import LENGTHS
 from ..bayes.posterior import SurfacePosterior, terms_to
 from ..bayes.prior import FREE
@@ -23,6 +23,10 @@ from .status import Taps
 
 VERSION = 4
 ORTHONORMAL = 1e-6  # Axes may be off by so much, because files may have them in single precision.
+FARTHEST = (
+    10.0  # Contacts and ends of curves are within this many radii of the origin: L is the farthest one.
+)
+WIDEST = 1e3  # The root of a covariance in unit radius has no larger numbers; the prior's have some 1.
 COEFFICIENTS = [terms_to(degree) - FREE for degree in range(2, 7)]  # Numbers of coefficients by degree.
 
 
@@ -84,8 +88,9 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
     if not isinstance(method, str) or method not in METHODS:
         raise ValueError(f"method: expected one of {', '.join(METHODS)}, got {shown(method)}")
     surface = _posterior(_of(d, "posterior")) if method == "bayes" else None
+    geometry = _geometry(_of(d, "geometry"), surface or patch)
     r = Reconstruction(
-        geometry=_geometry(_of(d, "geometry"), surface or patch),
+        geometry=geometry,
         patch=patch,
         contours=_contours(_of(d, "contours"), may_be_none=strokes is not None),
         noise=number("noise", _of(d, "noise"), least=0.0),
@@ -97,9 +102,18 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
         taps=_taps(d.get("taps")),
         known_height_std=number("mean_height_std", _of(d, "mean_height_std"), least=0.0),
     )
+    places = {f"contours[{i}]": contour.points for i, contour in enumerate(r.contours)}
+    for name, points in {"point": r.point[None], "strokes": r.strokes, **places}.items():
+        _require_near(name, points - r.frame.origin, r.radius)
     if not len(r.contacts):
         raise ValueError("contours: expected contacts besides the reference point, got none")
     return r
+
+
+def _require_near(name: str, offsets: Array, radius: float) -> None:
+    """Raises ValueError for places (n, k) relative to the origin that are too far away."""
+    if np.abs(offsets).max(initial=0.0) > FARTHEST * radius:
+        raise ValueError(f"{name}: expected places within {FARTHEST:g} radii of the origin, got others")
 
 
 def _of(d: Any, key: str) -> Any:
@@ -122,10 +136,12 @@ def _geometry(d: Any, surface: SurfacePosterior | MongePatch) -> Geometry:
     """The geometry with this surface: a posterior in unit radius, or a patch in the caller's unit."""
     frame, radius = _of(d, "frame"), number("radius", _of(d, "radius"), least=SMALLEST)
     axes = finite_array("axes", _of(frame, "axes"), (3, 3))
-    if np.abs(axes.T @ axes - np.eye(3)).max() > ORTHONORMAL or np.linalg.det(axes) < 0.0:
+    unit = np.clip(axes, -2.0, 2.0)  # The products of larger numbers might be none.
+    if np.abs(unit.T @ unit - np.eye(3)).max() > ORTHONORMAL or np.linalg.det(unit) < 0.0:
         raise ValueError("axes: expected a right-handed frame of unit vectors, got another matrix")
     open_ends = _of(d, "open_ends")
     ends = finite_array("domain", _of(d, "domain"), (None, 2))
+    _require_near("domain", ends, radius)
     if open_ends is not None:
         open_ends = finite_array("open_ends", open_ends, (len(ends),)) != 0.0
     return Geometry(
@@ -138,7 +154,7 @@ def _geometry(d: Any, surface: SurfacePosterior | MongePatch) -> Geometry:
 
 def _polynomial(d: Any) -> MongePatch:
     """The polynomial (1) that `polynomial_dict` wrote."""
-    coefficients = finite_array("coefficients", _of(d, "coefficients"), (None,))
+    coefficients = finite_array("coefficients", _of(d, "coefficients"), (None,), LARGEST)
     if len(coefficients) not in COEFFICIENTS:
         raise ValueError(
             f"coefficients: expected {', '.join(map(str, COEFFICIENTS))} of them, got {len(coefficients)}"
@@ -184,7 +200,9 @@ def _posterior(d: Any) -> SurfacePosterior:
         "alpha": (len(places),),
         "variances": (len(LENGTHS),),
     }
-    values = {name: finite_array(name, _of(d, name), shape) for name, shape in shapes.items()}
+    values = {name: finite_array(name, _of(d, name), shape, LARGEST) for name, shape in shapes.items()}
+    if np.abs(values["root"]).max(initial=0.0) > WIDEST:
+        raise ValueError(f"root: expected numbers up to {WIDEST:g} in unit radius, got larger ones")
     variances, noise = values["variances"], np.array(number("noise", _of(d, "noise"), above=0.0))
     if variances.min() < 0.0 or (variances.max() > 0.0) != (len(places) > 0):
         raise ValueError(

@@ -138,7 +138,7 @@ def notes(r: Judged) -> str:
         message += " The two curvatures are equal within their error, so there are no principal directions."
     if r.null_space_dimension:
         terms = terms_to(r.patch.degree)
-        message += f" These planes cannot show {r.null_space_dimension} of the {terms} shape terms."
+        message += f" These planes cannot show {r.null_space_dimension} of the {terms} ways to bend."
     return message
 
 

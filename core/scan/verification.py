@@ -14,7 +14,7 @@ from ..contours.finger import Surface, contact_of
 from ..contours.tracking import track
 from ..exploration.mesh_error import layer_height
 from ..patch.domain import GRID, Domain
-from ..patch.geometry import Geometry, distances, fit_error, overlapped
+from ..patch.geometry import POINTS_AT_ONCE, Geometry, distances, fit_error, overlapped
 from ..reconstruction.result import Reconstruction
 
 EXTRA = 9  # The number of contours that are tracked besides, as in the paper's Fig. 3.
@@ -32,7 +32,14 @@ def reachable(
 
     Nothing of `surface` hides them from above, and no other layer of it is nearer to the patch.
     """
-    points = np.asarray(vertices, dtype=float)
+    points, ways = np.asarray(vertices), np.asarray(normals)
+    parts = [slice(i, i + POINTS_AT_ONCE) for i in range(0, len(points), POINTS_AT_ONCE)]
+    found = [part.start + _reachable(geometry, surface, points[part], ways[part]) for part in parts]
+    return np.concatenate([np.empty(0, dtype=np.intp), *found])
+
+
+def _reachable(geometry: Geometry, surface: Surface, points: Array, normals: Array) -> NDArray[np.intp]:
+    """The `reachable` ones of some vertices (n, 3)."""
     over = overlapped(geometry, points, normals)
     up = vector_of(geometry.frame.axes[:, 2])
     visible = [not is_hidden(surface, vector_of(point), up, 2.0 * geometry.radius) for point in points[over]]

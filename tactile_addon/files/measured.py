@@ -17,7 +17,7 @@ from ...core.steps import part_of
 from ..touch.single_precision import require_single
 from ..touch.touch_object import Touched, reference_axes
 from ..touch.touch_report import TouchReport, measures, reconstruction_report, suggestion_report
-from ..touch.types import Array, Point
+from ..touch.types import Point
 from ..whole_object.whole_surface import WholeSurface
 from . import contact_file
 
@@ -179,9 +179,9 @@ def _fit(
         point = np.mean(np.vstack([stroke.points for stroke in strokes]), axis=0)
     contours, felt = [core.in_running_order(c, point) for c in contours], [*contours, *strokes]
     reconstruct = partial(core.reconstruct, point, contours, strokes=strokes, **options)
-    result = reconstruct(outward=_mean_normal(felt) if outward is None else outward)
-    bulges = (result.patch.k1 + result.patch.k2) * result.radius
     unknown = outward is None and not any(c.normals is not None for c in felt)
+    result = reconstruct(outward=(0.0, 0.0, 1.0) if unknown else outward)
+    bulges = (result.patch.k1 + result.patch.k2) * result.radius
     if flip is not (unknown and bulges > FLAT):
         result = reconstruct(outward=-result.frame.axes[:, 2])
     require_single("patch", result.radius, result.frame.origin)
@@ -211,10 +211,3 @@ def _report(result: core.Reconstruction, method: str) -> TouchReport:
         **measures(result),
         "suggested_plane": suggestion_report(result, axes),
     }
-
-
-def _mean_normal(contours: Sequence[core.Contour]) -> Array:
-    """The mean of all measured normals, or +z if there are none."""
-    normals = [contour.normals for contour in contours if contour.normals is not None]
-    mean = np.sum(np.vstack(normals), axis=0) if normals else np.zeros(3)
-    return mean if mean.any() else np.array([0.0, 0.0, 1.0])

@@ -3,15 +3,18 @@
 """Scenes and meshes in files, by Blender's own importers and exporter, without a window."""
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
 import numpy as np
 
+from ...core.arguments import many
 from ..touch.types import Object
 from . import mesh_numbers, ply_contacts, whole_file
 
 HEADER = 1 << 16  # The header of a .ply ends within this many bytes.
+MOST_NAMES = 10  # A sentence lists no more meshes.
 INCOMPLETE = "Blender has not written all of it"
 # The operators that import files with these endings, and their options.
 IMPORTS = {
@@ -26,12 +29,25 @@ def open_file(path: Path) -> None:
     if path.suffix.lower() == ".blend" and path.is_file():
         bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=False)
     else:
-        add(path, empty=True)
+        meshes = add(path, empty=True)
+        # Lines may be first, and the importer activates what is.
+        bpy.context.view_layer.objects.active = meshes[0] if len(meshes) == 1 else None
         bpy.context.scene.unit_settings.system = "NONE"  # Such a file does not name its unit.
 
 
-def add(path: Path, empty: bool = False) -> Object:
-    """Adds the mesh of a .ply, .stl or .obj file to the scene, or to an empty one, and returns its object.
+def named(path: Path, meshes: Sequence[Object], name: str) -> Object:
+    """The mesh object of this name, or the only one if `name` is "". Raises OSError that lists them."""
+    found = [obj for obj in meshes if name in ("", obj.name)]
+    if len(found) == 1:
+        return found[0]
+    wrong = f'no mesh "{name}"' if name else many(len(meshes), "mesh", "meshes")
+    names = ", ".join(f'"{obj.name}"' for obj in meshes[:MOST_NAMES])
+    more = f" and {len(meshes) - MOST_NAMES} more" if len(meshes) > MOST_NAMES else ""
+    raise OSError(f'"{path.name}" has {wrong}: name one of them with --target: {names}{more}')
+
+
+def add(path: Path, empty: bool = False) -> list[Object]:
+    """Adds a .ply, .stl or .obj file to the scene, or to an empty one; returns what has faces, by name.
 
     Raises OSError with a sentence for the user.
     """
@@ -51,10 +67,10 @@ def add(path: Path, empty: bool = False) -> Object:
     except RuntimeError as error:
         raise _unreadable(path) from error
     added: set[Object] = set(bpy.data.objects) - there
-    for obj in added:
-        if obj.type == "MESH" and len(obj.data.polygons):
-            return obj
-    raise _unreadable(path)
+    meshes = [obj for obj in added if obj.type == "MESH" and len(obj.data.polygons)]
+    if not meshes:
+        raise _unreadable(path)
+    return sorted(meshes, key=lambda obj: obj.name)
 
 
 def _require_readable(path: Path) -> None:

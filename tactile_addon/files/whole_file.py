@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Files that are written completely or not at all: next to the old file, which the new one then replaces."""
 
+import errno
 import os
 import secrets
 import shutil
@@ -38,9 +39,10 @@ def replacing(path: str | Path) -> Iterator[Path]:
             shutil.copymode(target, temporary)
         os.replace(temporary, target)
     except OSError as error:
+        is_forbidden = error.errno in (errno.EACCES, errno.EPERM, errno.EROFS)
+        advice = "get the right to write there" if is_forbidden else "make room there"
         raise OSError(
-            f'cannot write "{target.name}" ({error.strerror or error}): '
-            "make room there, or choose another place"
+            f'cannot write "{target.name}" ({error.strerror or error}): {advice}, or choose another place'
         ) from error
     finally:
         with suppress(OSError):

@@ -216,11 +216,8 @@ class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
         found = probe.probe_of(context.view_layer.objects.active)
         target = found.tactile_probe.target
         patch = probe.patch_of(found)
-        others = [] if patch is None else shown.overlapped(patch)
         patch_object.remove_objects([*patch_record.parts_of(patch), found])
         shown.share_ranges()
-        for other in others:  # It is no longer drawn above what is gone.
-            shown.settle(other)
         if target is not None:  # What comes next, as another pick, is about it.
             make_active(context, target)
         return {"FINISHED"}

@@ -12,7 +12,7 @@ from mathutils import Matrix
 
 from ..scene import patch_object, patch_record
 from ..scene.family import all_objects
-from ..touch.evaluated_mesh import checksum_of, is_disabled, require_invertible
+from ..touch.evaluated_mesh import checksum_of, is_disabled, require_in_scene, require_invertible
 from ..touch.settings import touch_arguments
 from ..touch.touch_object import Touched, completed, touch
 from ..touch.types import Object
@@ -117,6 +117,7 @@ def touch_at(probe: Object, depsgraph: bpy.types.Depsgraph, complete: bool, **mo
     if settings.target is None:
         raise ValueError("the probe has no target: choose the mesh to touch")
     if not _is_there(settings.target, depsgraph):
+        require_in_scene(settings.target)
         raise ValueError(
             f'"{settings.target.name}" is not in this view layer: bring it back, or choose another target'
         )

@@ -19,13 +19,10 @@ THICKNESS = 0.009  # That of a contour, as a share of the radius.
 RIM_CORNERS, RIM_THICKNESS = 96, 0.6  # The number of points of the rim; its share of a contour's thickness.
 TIP = 3.6  # The distance of a contact's tips from it is this multiple of a contour's thickness,
 LEAST_TIP, GAP = 1.6, 0.4  # or this share of the way to the next one, if they would run together.
-FLAT = 0.35  # They are flatter by this factor, so that a patch above them hides them.
+FLAT = 0.35  # They are flatter by this factor, so that they rise little above the patch.
 CONTACT_TIPS = np.vstack([np.diag([1.0, 1.0, FLAT]), -np.diag([1.0, 1.0, FLAT])])
 FACES = np.array([(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)])
 SIDES = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)])  # The corners of a square tube.
-
-
-HIGHEST = THICKNESS * max(1.0, FLAT * TIP)  # How far it rises above the contacts, as a share of the radius.
 
 
 class _Form(NamedTuple):

@@ -13,9 +13,7 @@ from ..touch.types import Array, Object
 from .attributes import DOMAIN, KEYS, POSITION, TYPES, attribute_of
 from .undo import note_copied
 
-ABOVE_MESH = "Above the Mesh"  # The modifier that draws an object above the mesh in which it lies.
-ABOVE = "tactile_above"  # A custom property of objects: how far above its mesh it is drawn, and for patches
-OWN_ABOVE = "tactile_own_above"  # how far if it were not above another, which is drawn so far above the mesh.
+ABOVE = "tactile_above"  # A custom property of objects: how far above its mesh it is drawn.
 
 
 def fill(
@@ -70,13 +68,6 @@ def corners_of(mesh: bpy.types.Mesh) -> Array:
     return read_array(mesh.loops, "vertex_index", dtype=np.int32).reshape(-1, 3)
 
 
-def draw_above(obj: Object, height: float) -> bpy.types.Modifier:
-    """Draws an object this far along its normals, by a modifier, which is returned."""
-    above: Any = obj.modifiers.get(ABOVE_MESH) or obj.modifiers.new(ABOVE_MESH, "DISPLACE")
-    above.mid_level, above.strength = 0.0, height
-    return above
-
-
 def emission(
     name: str,
     attribute: str | None = None,
@@ -87,7 +78,7 @@ def emission(
 
     Eevee and Cycles draw what has it above the mesh in which it lies, by the object's length ABOVE: along its
     normals, or upright, which is along the object's z, as a patch and its thin contours are. Solid shading
-    draws it in front instead, and neither changes its geometry.
+    draws it in front instead, or viewport/above does. None of these changes its geometry.
     """
     material: Any = bpy.data.materials.get(name)
     if material is None:

@@ -15,7 +15,7 @@ from ..touch.types import Array, Object
 from .attributes import COLOR, DEVIATION, GAUSSIAN_STD, HEIGHT_STD, NORMAL, PLACE, POSITION
 from .contour_mesh import fill_contours
 from .family import add
-from .mesh_data import ABOVE, OWN_ABOVE, emission, fill, own_mesh, values, write
+from .mesh_data import ABOVE, emission, fill, own_mesh, values, write
 from .patch_record import (
     CONTOURS,
     QUANTITIES_OF_A_FIT,
@@ -101,7 +101,7 @@ def rewrite(patch: Object, touched: Touched) -> None:
         names["contours"] = lines.name
     place(patch, Matrix(matrix_of(touched.result.frame.axes, touched.result.frame.origin).tolist()))
     for obj in parts_of(patch):
-        obj[ABOVE] = obj[OWN_ABOVE] = _above(patch, touched)
+        obj[ABOVE] = _above(patch, touched)
     patch[RECORD] = touched.report | names
     patch.pop(RECONSTRUCTION, None)
     patch.pop(VERDICT, None)

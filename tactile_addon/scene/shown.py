@@ -1,23 +1,20 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How patches and whole objects are shown: their colors, and patches that are near or over each other."""
+"""How patches and whole objects are shown: their colors, with one range for all patches of a mesh."""
 
 from collections.abc import Mapping
 from typing import Any
 
 import bpy
 import numpy as np
-from mathutils.bvhtree import BVHTree
 
 from ... import core
 from ..touch.arrays import read_array
-from ..touch.touch_report import TouchReport
 from ..touch.types import Array, Object
 from . import colors
 from .attributes import COLOR, CURVATURE_STD, CURVATURES, DEVIATION, GAUSSIAN_STD, POSITION
-from .contour_mesh import HIGHEST
 from .family import all_objects
-from .mesh_data import ABOVE, OWN_ABOVE, corners_of, own_mesh, values
+from .mesh_data import own_mesh, values
 from .patch_record import (
     ATLAS_RECORD,
     COMMON_RANGE,
@@ -25,7 +22,6 @@ from .patch_record import (
     RANGE,
     RECORD,
     is_colored,
-    parts_of,
 )
 
 # The range of colors is no smaller, so that a plane is pale green: in units of the radius,
@@ -36,14 +32,6 @@ TINY = 0.1  # Patches with more than this share of the area of all set the range
 PALE = 0.05  # Values below this share of the range are pale.
 LEAST_SHARE = 0.5  # That of K is no smaller than this share of the median curvedness, squared,
 ERROR_SHARE = 8.0  # or than this one where K may be 0 all over the patch.
-LAYER = "tactile_layer"  # A patch's number among those that overlap; 0 is the lowest.
-ABOVE_OTHERS = "Above Other Patches"  # The modifier that draws it above those with lower numbers,
-APART = 2.0  # by this multiple of the deviations of the heights of both,
-LEAST_LAYER, MOST_LAYER = 3e-3, 3e-2  # and by no less and no more than these shares of its radius,
-MOST_FURTHER = 0.12  # and further, by up to this share, where it would be below the other.
-HIDDEN = 1.2 * HIGHEST  # A patch is so far above another, in radii of that, that its contours do not show.
-# Patches overlap only if the cosine between their normals is more; that of two walls of a block is 0.
-ALIKE = 0.1
 
 
 def recolor(obj: Object) -> None:
@@ -130,10 +118,8 @@ def _corners_shown(mesh: bpy.types.Mesh, unknown: Any, edge: float) -> Array:
 
 
 def settle(patch: Object) -> None:
-    """Gives a patch one range of colors with others of its mesh, and draws it above those it overlaps."""
-    others = _others(patch)
-    _share([patch, *(obj for obj in others if _group(obj) == _group(patch))])
-    _draw_above(patch, others)
+    """Gives a patch one range of colors with others of its mesh."""
+    _share([patch, *(obj for obj in _others(patch) if _group(obj) == _group(patch))])
 
 
 def share_ranges() -> None:
@@ -143,13 +129,6 @@ def share_ranges() -> None:
         groups.setdefault(_group(obj), []).append(obj)
     for patches in groups.values():
         _share(patches)
-
-
-def overlapped(patch: Object) -> list[Object]:
-    """All patches over or below a patch, the lowest first."""
-    if not is_colored(patch):
-        return []
-    return sorted((obj for obj in _others(patch) if _overlap(patch[RECORD], obj[RECORD])), key=_layer)
 
 
 def _group(patch: Object) -> tuple[str, str]:
@@ -181,100 +160,6 @@ def _largest(records: list[Any], key: str) -> Any:
     ordered = sorted(records, key=lambda record: record.get(key, 0.0))
     areas = np.cumsum([record["radius"] ** 2 for record in ordered])
     return ordered[np.searchsorted(areas, (1.0 - TINY) * areas[-1])]
-
-
-def _draw_above(patch: Object, others: list[Object]) -> None:
-    """Draws a patch above those that it overlaps, by a modifier that rendering and most exports leave out."""
-    patch[LAYER] = _lowest_layer(patch, others)
-    higher = [obj for obj in others if _layer(obj) > patch[LAYER]]
-    higher = [obj for obj in higher if _overlap(patch[RECORD], obj[RECORD])]
-    for obj in (patch, *sorted(higher, key=lambda each: each[LAYER])):
-        below = [each for each in (patch, *others) if _layer(each) < _layer(obj)]
-        below = [each for each in below if _overlap(obj[RECORD], each[RECORD])]
-        height = _height_above(obj, below) if below else _above_surfaces(obj)
-        above = max([obj.get(OWN_ABOVE, 0.0), *(each.get(ABOVE, 0.0) for each in below)])
-        for part in parts_of(obj):
-            _lift(part, height)
-            part[ABOVE] = above
-
-
-def _layer(patch: Object) -> int:
-    return int(patch.get(LAYER, 0))
-
-
-def _lowest_layer(patch: Object, others: list[Object]) -> int:
-    """The lowest number of a layer that no patch over or below has."""
-    taken = {_layer(obj) for obj in others if _overlap(patch[RECORD], obj[RECORD])}
-    return next(number for number in range(len(taken) + 1) if number not in taken)
-
-
-def settle_on(surface: Object) -> None:
-    """Draws all patches of its mesh above the surface of a whole object, which is in the same place."""
-    source = surface[ATLAS_RECORD]["source"]
-    for patch in [obj for obj in all_objects() if RECORD in obj and obj[RECORD]["source"] == source]:
-        if patch.is_editable and is_colored(patch):
-            settle(patch)
-
-
-def _above_surfaces(patch: Object) -> float:
-    """How far above the surfaces of whole objects a patch is drawn; 0 if its mesh has none."""
-    report = patch[RECORD]
-    surfaces = (obj[ATLAS_RECORD] for obj in all_objects() if ATLAS_RECORD in obj)
-    here = (_apart(report, surface) for surface in surfaces if surface["source"] == report["source"])
-    return max(here, default=0.0)
-
-
-def _apart(upper: Mapping[str, Any], lower: Mapping[str, Any]) -> float:
-    """By how much more than both of two reports may be off the upper one is drawn higher."""
-    apart, radius = APART * (upper["height_std"] + lower["height_std"]), upper["radius"]
-    return float(min(max(apart, LEAST_LAYER * radius), MOST_LAYER * radius))
-
-
-def _height_above(upper: Object, below: list[Object]) -> float:
-    """How high a patch is drawn above others: by more than both may be off, as two in one place flicker."""
-    further, found = MOST_FURTHER * upper[RECORD]["radius"], 0.0
-    modifiers = [(lower.modifiers.get(ABOVE_OTHERS), lower) for lower in below]
-    heights = [(0.0 if modifier is None else modifier.strength, lower) for modifier, lower in modifiers]
-    for height, lower in sorted(heights, key=lambda each: -each[0]):
-        layer = max(_apart(upper[RECORD], lower[RECORD]), HIDDEN * lower[RECORD]["radius"])
-        if height + further + layer > found:
-            reach = min(_reach(lower, height, upper), height + further)
-            found = max(found, max(height, reach) + layer)
-    return found
-
-
-def _reach(lower: Object, height: float, upper: Object) -> float:
-    """How far a patch that is drawn at this height is above vertices of another, along the normal of that."""
-    matrix = np.array(upper.matrix_world.inverted_safe() @ lower.matrix_world)
-    corners = read_array(lower.data.vertices, "co", 3) + np.array([0.0, 0.0, height])
-    corners = corners @ matrix[:3, :3].T + matrix[:3, 3]
-    tree = BVHTree.FromPolygons(corners.tolist(), corners_of(lower.data).tolist(), all_triangles=True)
-    top, reach = float(corners[:, 2].max()) + upper[RECORD]["radius"], 0.0
-    for x, y, z in read_array(upper.data.vertices, "co", 3).tolist():
-        place = tree.ray_cast((x, y, top), (0.0, 0.0, -1.0))[0]
-        if place is not None:
-            reach = max(reach, place.z - z)
-    return reach
-
-
-def _lift(obj: Object, height: float) -> None:
-    """Draws a patch or its contours higher along the patch's normal."""
-    modifier = obj.modifiers.get(ABOVE_OTHERS)
-    if height == 0.0:
-        if modifier is not None:
-            obj.modifiers.remove(modifier)
-        return
-    if modifier is None:
-        modifier = obj.modifiers.new(ABOVE_OTHERS, "DISPLACE")
-    modifier.direction, modifier.mid_level, modifier.show_render = "Z", 0.0, False
-    modifier.strength = height
-
-
-def _overlap(a: TouchReport, b: TouchReport) -> bool:
-    """Whether the patches of two reports may lie over each other."""
-    apart = np.subtract(a["frame"]["origin"], b["frame"]["origin"])
-    alike = np.dot(a["frame"]["normal"], b["frame"]["normal"])
-    return bool(alike > ALIKE and np.linalg.norm(apart) < a["radius"] + b["radius"])
 
 
 def _others(patch: Object | None) -> list[Object]:

@@ -13,7 +13,7 @@ from mathutils import Vector
 from ... import core
 from ..scene import colors, patch_object, patch_record
 from ..scene.attributes import CORNERS, HEIGHT_STD, MAP_COLOR, MEASURES, REASON, TOUCH
-from ..scene.mesh_data import draw_above, emission, write
+from ..scene.mesh_data import ABOVE, emission, write
 from ..scene.shown import LEAST_RANGE
 from ..scene.viewports import show_colors
 from ..touch.arrays import read_array
@@ -44,7 +44,7 @@ MAP_QUANTITIES = [
         "Factor by which plain least squares amplifies noise",
         0,
     ),
-    ("blind_share", "Blind Share", "Share of the shape terms that the planes cannot show", 0),
+    ("blind_share", "Blind Share", "Share of the ways to bend that the planes cannot show", 0),
     (REASON, "Reason", "Whether there is a patch, and why there is none", 0),
 ]
 LOGARITHMIC = ("condition_number",)  # These have a logarithmic scale from 1.
@@ -73,7 +73,7 @@ def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Ob
     mesh.transform(painted.matrix_basis.inverted_safe() @ obj.matrix_world)
     # It would lie in the mesh it describes, so it is shown a little above it. It is not shown in front,
     # because patches that lie in it are.
-    draw_above(painted, SHOWN_ABOVE * math.dist(painted.bound_box[0], painted.bound_box[6]))
+    painted[ABOVE] = SHOWN_ABOVE * math.dist(painted.bound_box[0], painted.bound_box[6])
     areas = _paint(mesh, touched)
     places = np.array(touched.places[: touched.done]).reshape(-1, 3) + touched.surface.origin
     painted[PLACES] = _applied(np.linalg.inv(_array(painted.matrix_basis)), places).ravel().tolist()

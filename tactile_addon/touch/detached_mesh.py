@@ -11,7 +11,7 @@ import numpy as np
 from mathutils.bvhtree import BVHTree
 
 from .arrays import read_array
-from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object
+from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, require_in_scene
 from .types import Array, Object, Point, Triple
 
 PAUSE = 50.0  # The time until the shape is compared again, as a multiple of the time that this takes.
@@ -72,6 +72,8 @@ class DetachedMesh(PlacedMesh):
         """
         found = next((o for o in context.view_layer.objects if o.session_uid == self._uid), None)
         if found is None:
+            for left in (obj for obj in bpy.data.objects if obj.session_uid == self._uid):
+                require_in_scene(left)
             raise ValueError(f'"{self.name}" is gone, so touching was stopped')
         if context.mode != "OBJECT" or found.mode != "OBJECT":
             raise ValueError("Touching was stopped because Object Mode was left: start it again")

@@ -40,9 +40,19 @@ def is_disabled(obj: Object) -> bool:
 
 def disabled(obj: Object) -> ValueError:
     """The error to raise for an object that Blender has not evaluated."""
+    require_in_scene(obj)
     return ValueError(
         f'"{obj.name}" is disabled in viewports or excluded from the view layer: enable it there'
     )
+
+
+def require_in_scene(obj: Object) -> None:
+    """Raises ValueError, with a sentence, if an object is only in another scene than this one."""
+    scenes = [scene.name for scene in obj.users_scene]
+    if scenes and bpy.context.scene.name not in scenes:
+        raise ValueError(
+            f'"{obj.name}" is in the scene "{scenes[0]}": go there, or choose an object of this scene'
+        )
 
 
 def evaluated_object(obj: Object, depsgraph: bpy.types.Depsgraph) -> tuple[Object, Array, Array]:

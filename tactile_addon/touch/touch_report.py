@@ -79,7 +79,7 @@ class TouchReport(TypedDict, total=False):
     contacts: int
     fit_error: float  # Equation (6).
     height_std: float  # The mean over the domain.
-    blind: int  # The number of shape terms that the planes cannot show.
+    blind: int  # The number of ways to bend that the planes cannot show.
 
     source: str  # The name of the object that was touched, or of the file of the contacts.
     method: str

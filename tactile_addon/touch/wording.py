@@ -40,13 +40,16 @@ def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
         ("mean curvature", _measured(report, "mean_curvature", -1, unit)),
         ("shape index", "none, it is flat" if is_flat(report) else f"{report['shape_index']:.3f}"),
         ("curvedness", say(rounded(report["curvedness"], -1, report["radius"]), -1, unit)),
-        ("Gaussian process", _amplitude(report, unit)),
-        ("fit error (6)", _shared(report, "fit_error", unit)),
+        ("texture beside the polynomial", _amplitude(report, unit)),
+        ("contacts off the patch, mean", _shared(report, "fit_error", unit)),
         ("standard deviation of the height", _shared(report, "height_std", unit)),
         ("mesh to patch", _verification(report, unit)),
         *_verified_rows(report, unit),
         ("suggested next plane", _suggestion(report["suggested_plane"], unit)),
-        ("total |K| (8)", f"{rounded(report['total_absolute_curvature'], 0, report['radius']):.4g}"),
+        (
+            "total absolute curvature",
+            f"{rounded(report['total_absolute_curvature'], 0, report['radius']):.4g}",
+        ),
         ("condition number", f"{report['condition_number']:.2g}"),
         ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in seconds.items())),
     ]
@@ -171,7 +174,7 @@ def _verified_rows(report: TouchReport, unit: Unit) -> list[tuple[str, str]]:
     return [
         *rows,
         *((f"{name} distances", _spread(report, f"{name}_distance", unit)) for name in names),
-        ("(6) on more curves", f"{more}{points} on {curves}"),
+        ("distance on more curves", f"{more}{points} on {curves}"),
         ("overlap", f"{100.0 * found['overlap']:.0f} % of the area"),
     ]
 
@@ -211,8 +214,8 @@ def _measured(report: Mapping[str, Any], key: str, power: int, unit: Unit) -> st
 
 
 def _amplitude(report: TouchReport, unit: Unit) -> str:
-    """The amplitude of the process that is added to the polynomial, in words."""
-    return f"amplitude {_shared(report, 'residual', unit)}" if report["residual"] else "none"
+    """The deviation of the process that is added to the polynomial, in words."""
+    return _shared(report, "residual", unit) if report["residual"] else "none"
 
 
 def _shared(report: Mapping[str, Any], key: str, unit: Unit) -> str:

@@ -22,6 +22,7 @@ from ..touch import units
 from ..touch.touch_object import Touched, plane_axes
 from ..touch.types import Array, Object
 from ..touch.units import Unit
+from .above import draw_above
 from .drag import DRAG_TILT, DRAG_TURN
 from .free_view import free_strip
 from .mouse import is_over
@@ -261,7 +262,7 @@ def _fill(points: Sequence[Sequence[float]], shades: Sequence[Sequence[float]]) 
 # Functions that draw and when they do so: those that are always there, and those of a pick. The latter get a
 # dict with the keys touched, the touch whose preview is drawn, or None; refusal, a sentence on why there is
 # none, or None; and mouse, where the mouse is in the window.
-DRAWINGS = ((draw_plane, "POST_VIEW"), (draw_legend, "POST_PIXEL"))
+DRAWINGS = ((draw_above, "POST_VIEW"), (draw_plane, "POST_VIEW"), (draw_legend, "POST_PIXEL"))
 PICK_DRAWINGS = ((draw_preview, "POST_VIEW"), (draw_key, "POST_PIXEL"))
 
 

@@ -14,8 +14,8 @@ from mathutils import Matrix
 from ... import core
 from ..scene import colors, patch_object, patch_record, undo
 from ..scene.attributes import COLOR, CORNERS, DEVIATION, HEIGHT_STD, NODE
-from ..scene.mesh_data import ABOVE, draw_above, emission, fill, own_mesh, write
-from ..scene.shown import ALIKE, LEAST_BEND, least_gaussian_range, recolor, settle_on
+from ..scene.mesh_data import ABOVE, emission, fill, own_mesh, write
+from ..scene.shown import LEAST_BEND, least_gaussian_range, recolor
 from ..scene.viewports import show_colors, show_size
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Array, Object
@@ -28,7 +28,9 @@ RIM_COLOR = (0.02, 0.02, 0.02, 1.0)
 # It is drawn no lower than the mesh, above that by this share of the object's size, or of its own if that is
 # less, and above patches that it overlaps by as much, up to so many times.
 LAYER, OWN_LAYER, LAYERS = 6e-4, 2e-2, 6
-DRAWN_ABOVE = 5e-3  # That of the whole surface, where it is not drawn in front.
+# Patches overlap only if the cosine between their normals is more; that of two walls of a block is 0.
+ALIKE = 0.1
+DRAWN_ABOVE = 5e-3  # That of the whole surface where it is not drawn in front, as a share of its size.
 
 
 class GrowingPatches:
@@ -156,7 +158,4 @@ def rewrite(obj: Object, whole: WholeSurface, report: dict[str, Any]) -> None:
     obj[ABOVE] = DRAWN_ABOVE * float(np.ptp(found.vertices, axis=0).max())
     # In front of the object the far side of an incomplete surface would fill what was not felt.
     obj.show_in_front = not report.get("uncovered")
-    if not obj.show_in_front:
-        draw_above(obj, obj[ABOVE]).show_render = False
     recolor(obj)
-    settle_on(obj)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
-from scenes import PLACE
+from scenes import PLACE, add_sphere
 
 
 def from_every_kind(command, files, *words):
@@ -242,6 +242,35 @@ def test_help(command):
     code, out, _ = command("reconstruct", "--help")
     assert code == 0
     assert "--azimuths" in out
+    code, out, _ = command("--help")
+    assert code == 0
+    assert "Touch meshes, or read measured contacts, and rebuild the surface." in " ".join(out.split())
+    assert "The words of" not in out
+
+
+def test_normals_have_the_same_unit_in_the_shell_and_in_files(command, empty, tmp_path):
+    rows = contacts_on_second(tmp_path / "second.csv").read_text().splitlines()[1:]
+    normals = [
+        ",".join(map(str, np.subtract([float(w) for w in row.split(",")[1:]], [6, 0, 0]))) for row in rows
+    ]
+    table = "\n".join(["curve,x,y,z,nx,ny,nz", *map(",".join, zip(rows, normals, strict=True))])
+    (tmp_path / "bare.csv").write_text(table)
+    (tmp_path / "noted.csv").write_text("# normal_std 0.02\n" + table)
+    found = []
+    for words in (["bare.csv", "--normal-std", "0.02"], ["noted.csv"]):
+        code, out, _ = command("fit", tmp_path / words[0], *words[1:], "--json", "-")
+        assert code == 0
+        found.append(json.loads(next(line for line in out.splitlines() if line.startswith("{"))))
+    assert found[0]["height_std"] == pytest.approx(found[1]["height_std"], rel=1e-6)
+
+
+def test_a_mesh_has_the_unit_that_is_named(command, files):
+    code, out, _ = command("reconstruct", files / "ball.ply", *PLACE, "--unit", "mm")
+    assert code == 0
+    assert re.search(r"^principal curvatures +-0\.\d+ .*1/mm", out, re.MULTILINE)
+    code, _, err = command("reconstruct", files / "ball.blend", *PLACE, "--unit", "mm")
+    assert code == 2
+    assert "--unit: expected a .ply, .stl or .obj file, because a .blend names its own unit" in err
 
 
 VERTICES = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.5], [2, 0, 0.5]]
@@ -403,3 +432,82 @@ def test_where_curves_meet_is_reported_in_double_precision(command, empty, tmp_p
     # The fit passes near the point, which is a contact like the others.
     assert report["frame"]["origin"][:2] == point[:2].tolist()
     assert report["frame"]["origin"][2] == pytest.approx(point[2], abs=1e-6)
+
+
+@pytest.fixture
+def two(empty, tmp_path):
+    """A .obj file with lines, a ball of radius 1 at the origin and one of radius 2 at x = 6."""
+    for name, radius, x in (("first", 1.0, 0.0), ("second", 2.0, 6.0)):
+        add_sphere(empty, 64, 32, radius=radius, location=(x, 0.0, 0.0)).name = name
+    text = export_obj(empty, tmp_path / "two.obj")
+    (tmp_path / "two.obj").write_text("o lines\nv 0 0 3\nv 1 0 3\nl 1 2\n" + shifted(text, 2))
+    return tmp_path / "two.obj"
+
+
+def export_obj(bpy, path):
+    bpy.ops.wm.obj_export(
+        filepath=str(path), forward_axis="Y", up_axis="Z", export_uv=False, export_normals=False
+    )
+    return path.read_text()
+
+
+def shifted(text, count):
+    """The text of a .obj file whose faces begin this many vertices later."""
+    lines = (line.split() for line in text.splitlines() if not line.startswith(("#", "mtllib", "usemtl")))
+    return "\n".join(
+        " ".join([w[0], *(str(int(n) + count) for n in w[1:])] if w[0] == "f" else w) for w in lines if w
+    )
+
+
+def contacts_on_second(path):
+    """A file of three curves over the top of the second ball."""
+    rows = ["curve,x,y,z"]
+    for curve, azimuth in enumerate(np.radians([0, 60, 120])):
+        for t in np.linspace(-0.6, 0.6, 11):
+            x, y = 2 * np.sin(t) * np.cos(azimuth), 2 * np.sin(t) * np.sin(azimuth)
+            rows.append(f"{curve},{6 + x:.7f},{y:.7f},{2 * np.cos(t):.7f}")
+    path.write_text("\n".join(rows))
+    return path
+
+
+@pytest.mark.parametrize("name", ["object", "map", "reconstruct"])
+def test_one_of_several_meshes_in_a_file_has_to_be_named(command, two, name):
+    code, _, err = command(name, two)
+    assert (code, err.strip()) == (
+        1,
+        'tactile: "two.obj" has 2 meshes: name one of them with --target: "first", "second"',
+    )
+
+
+def test_the_mesh_that_is_named_is_touched(command, two):
+    for name, curvature in (("first", -1.0), ("second", -0.5)):
+        place = ["--location", {"first": 0, "second": 6}[name], 0, -1.0 / curvature]
+        code, out, _ = command("reconstruct", two, "--target", name, *place, "--json", "-")
+        report = json.loads(next(line for line in out.splitlines() if line.startswith("{")))
+        assert (code, report["source"]) == (0, name)
+        assert report["k1"] == pytest.approx(curvature, rel=0.05)
+
+
+def test_lines_beside_the_only_mesh_are_no_reason_to_refuse_it(command, two):
+    text = two.read_text()
+    two.write_text(text[: text.index("o second")])
+    code, out, _ = command("reconstruct", two, "--location", 0, 0, 1, "--json", "-")
+    assert code == 0
+    assert '"source": "first"' in out
+
+
+def test_a_patch_is_put_onto_the_mesh_that_is_named(command, two, tmp_path):
+    contacts = contacts_on_second(tmp_path / "contacts.csv")
+    code, _, err = command("fit", contacts, "--onto", two)
+    assert code == 1
+    assert '"two.obj" has 2 meshes: name one of them with --target: "first", "second"' in err
+    code, out, _ = command("fit", contacts, "--onto", two, "--target", "second", "--json", "-")
+    report = json.loads(next(line for line in out.splitlines() if line.startswith("{")))
+    assert code == 0
+    assert report["verification"]["target"] == "second"
+    code, _, err = command("fit", contacts, "--target", "second")
+    assert code == 2
+    assert "--target: expected --onto MESH too" in err
+    code, _, err = command("fit", contacts, "--onto", two, "--target", "third")
+    assert code == 1
+    assert '"two.obj" has no mesh "third": name one of them with --target: "first", "second"' in err

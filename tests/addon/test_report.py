@@ -89,7 +89,7 @@ def test_the_page_of_a_patch_is_whole_and_its_shares_are_those_of_its_area(empty
     # All lengths of the page are in the unit of its scene.
     assert (rows["noise"], rows["extent"], rows["step"]) == ("0.002 m", "0.6 m", "0.06 m")
     assert rows["verdict"] in text.split("<h2>")[0]
-    assert rows["Gaussian process"] == "none"
+    assert rows["texture beside the polynomial"] == "none"
     assert "e-" not in rows["normal"] + rows["first principal direction"] + rows["suggested next plane"]
     assert rows["planes"] == "0° leaning 0°, 60° leaning 0°, 120° leaning 0°"
     assert rows["Blender"] == empty.app.version_string

@@ -391,7 +391,7 @@ def test_from_the_shell(empty, command, tmp_path):
     words = ["reconstruct", ball, "--location", *TOP, "--extent", 0.6]
     code, out, _ = command(*words, "--json", report, "--verify", table)
     assert code == 0
-    assert "(6) on more curves" in out
+    assert "distance on more curves" in out
     assert "100 % of the area" in out
     found = json.loads(report.read_text())["verification"]
     (row,) = csv.DictReader(table.read_text(encoding="utf-8").splitlines())

@@ -199,7 +199,7 @@ def test_what_the_tracker_made_comes_back_as_it_was(contact_file, tmp_path):
         assert (other.noise, other.normal_std) == (0.05, None)
     head = (tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()
     assert head[:5] == [
-        "# Tactile Patch contacts, version 2, lengths in mm",
+        "# Tactile Patch contacts, version 3, lengths in mm",
         "# point 0.1 0.3333333333333333 2e-17",
         "# outward 0.6 0.0 -0.8",
         "# noise 0.05",
@@ -229,16 +229,6 @@ def test_what_was_exported_and_is_read_gives_the_same_patch(
     assert (again.patch.k1, again.patch.k2) == pytest.approx((r.patch.k1, r.patch.k2), **near)
     assert again.frame.axes == pytest.approx(r.frame.axes, **near)
     assert again.mean_height_std == pytest.approx(r.mean_height_std, **near)
-
-
-def test_comments_that_are_not_ours_say_nothing(contact_file, tmp_path):
-    """The comments are those of other programs, of version 1, and below the header."""
-    notes = "# point 1 2 3\n# noise 5\n"
-    titles = "# made by a robot\n", "# Tactile Patch contacts, version 1, lengths in no unit\n", ""
-    for text in (titles[0] + notes + PLAIN, titles[1] + PLAIN, titles[2] + notes + PLAIN, PLAIN + notes):
-        (tmp_path / "other.csv").write_text(text)
-        contours, unit, point, outward, _ = contact_file.read(tmp_path / "other.csv")
-        assert (unit, point, outward, contours[0].noise) == ("", None, None, None)
 
 
 @given(

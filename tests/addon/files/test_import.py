@@ -416,7 +416,7 @@ def test_every_option_of_fit_arrives(command, empty, measured):
     assert [report[key] for key in ("method", "degree", "unit")] == ["quadratic-variation", 5, "cm"]
     assert report["frame"]["origin"] == pytest.approx(SURFACE.point, rel=1e-6)
     assert np.dot(report["frame"]["normal"], SURFACE.normal) < -0.99
-    code, out, _ = command("fit", path, "--flip", "--normal-std", "1", *FIT)
+    code, out, _ = command("fit", path, "--flip", "--normal-std", "0.0175", *FIT)
     report = report_in(out)
     assert report["blind"] == 0
     assert np.dot(report["frame"]["normal"], SURFACE.normal) < -0.99

@@ -56,6 +56,11 @@ def test_on_a_full_disk_the_old_file_stays_and_the_error_names_it(command, files
     assert old is None or out.read_text() == old
 
 
+def test_a_folder_in_which_nobody_may_write_is_no_question_of_room(whole_file):
+    with pytest.raises(OSError, match="get the right to write there, or choose another place"):
+        whole_file.write_text("/sys/out.json", "{}")
+
+
 @pytest.mark.parametrize(("option", "kind"), WRITERS)
 def test_a_new_file_takes_the_old_one_s_place_at_once_and_has_its_rights(command, files, option, kind):
     out = files / f"out.{kind}"

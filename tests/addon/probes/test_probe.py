@@ -475,6 +475,11 @@ def exclude(bpy, ball):
     bpy.context.view_layer.layer_collection.children["Hidden"].exclude = True
 
 
+def to_another_scene(bpy, ball):
+    bpy.data.scenes.new("Studio").collection.objects.link(ball)
+    bpy.context.scene.collection.objects.unlink(ball)
+
+
 NO_TARGET = "The probe has no target: choose the mesh to touch"
 
 
@@ -486,10 +491,11 @@ NO_TARGET = "The probe has no target: choose the mesh to touch"
         (lambda bpy, ball: bpy.context.scene.collection.objects.unlink(ball), NO_TARGET, SET[1:]),
         (lambda bpy, _: setattr(bpy.context.object.tactile_probe, "target", None), NO_TARGET, SET),
         (exclude, '"Sphere" is not in this view layer', SET),
+        (to_another_scene, '"Sphere" is in the scene "Studio": go there, or choose', SET),
         (lambda _, ball: setattr(ball, "hide_viewport", True), '"Sphere" is disabled in viewports', SET),
         (lambda _, ball: ball.data.clear_geometry() or ball.data.update(), '"Sphere" has no faces', SET),
     ],
-    ids=["removed", "deleted", "unlinked", "none", "excluded", "disabled", "empty"],
+    ids=["removed", "deleted", "unlinked", "none", "excluded", "elsewhere", "disabled", "empty"],
 )
 def test_without_a_target_the_probe_says_so_and_keeps_its_patch(
     empty, extension, ball, capfd, spoil, sentence, left

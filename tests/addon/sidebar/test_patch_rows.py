@@ -72,7 +72,7 @@ def test_a_flat_patch_has_no_shape_index(said, empty):
 def test_the_verdict_says_good_and_how_good(wording):
     assert wording.verdict(record(), UNIT) == "Good: heights to ± 0.0123 mm"
     blind = record(
-        message="The patch describes its contacts. These planes cannot show 3 of the 28 shape terms."
+        message="The patch describes its contacts. These planes cannot show 3 of the 28 ways to bend."
     )
     assert wording.verdict(blind, UNIT) == "Good: heights to ± 0.0123 mm"
 
@@ -98,7 +98,7 @@ def test_the_deviation_at_the_rim_stands_below_the_mean(said, ball):
 def test_the_verdict_says_what_to_do_where_there_is_doubt(wording, status):
     message = (
         "Heights are accurate to 5.3 % of the radius on average: use a shorter extent or add sampling planes."
-        " These planes cannot show 3 of the 28 shape terms. All half curves end at a crease."
+        " These planes cannot show 3 of the 28 ways to bend. All half curves end at a crease."
     )
     words = wording.verdict(record(status, message), UNIT)
     assert words == "Doubtful: use a shorter extent or add sampling planes"

@@ -281,7 +281,7 @@ def test_the_default_is_the_accurate_fit(empty, ball):
     assert (report["method"], report["degree"]) == ("bayes", 4)
     assert report["vertex_distance_mean"] < 0.5 * tagc["vertex_distance_mean"]
     assert report["blind"] == 3
-    assert "These planes cannot show 3 of the 14 shape terms" in report["message"]
+    assert "These planes cannot show 3 of the 14 ways to bend" in report["message"]
 
 
 def test_degree_0_is_what_the_contacts_show(empty):
@@ -456,6 +456,12 @@ def excluded(bpy):
     bpy.context.view_layer.layer_collection.children["Hidden"].exclude = True
 
 
+def in_another_scene(bpy):
+    obj = bpy.context.object
+    bpy.data.scenes.new("Studio").collection.objects.link(obj)
+    bpy.context.scene.collection.objects.unlink(obj)
+
+
 def far_away(bpy):
     bpy.context.object.location.x = 2e6
 
@@ -490,6 +496,11 @@ def nothing(bpy):
         (one_vertex_far_away, {}, "reaches farther than 1e+15 from the origin"),
         (disabled, {}, "disabled in viewports or excluded from the view layer"),
         (excluded, {}, "disabled in viewports or excluded from the view layer"),
+        (
+            in_another_scene,
+            {},
+            '"Sphere" is in the scene "Studio": go there, or choose an object of this scene',
+        ),
         (far_away, {"location": (2e6, 0.0, 2.0)}, "apart in single precision, too coarse"),
         (far_in_its_mesh, {}, "apart in single precision, too coarse"),
         (nothing, {"location": (0.0, 0.0, 9.0)}, "The location is 7 m away"),

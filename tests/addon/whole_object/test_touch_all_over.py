@@ -133,7 +133,7 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball, extension):
     assert (rows["Surface"], rows["Goes On At"]) == ("Incomplete", places)
     # Its far side does not show through where nothing was felt.
     assert not surface.show_in_front
-    assert surface.modifiers["Above the Mesh"].strength > 0.0
+    assert surface["tactile_above"] > 0.0
     # What was not felt is where the mesh is farthest from the surface.
     assert record["deviation_max"] > 1.0
     assert np.linalg.norm(record["deviation_place"]) == pytest.approx(2.0, abs=0.01)
@@ -245,22 +245,3 @@ def test_an_edited_surface_has_no_report(empty, ball, tmp_path):
     with pytest.raises(RuntimeError, match="was edited and is no longer a complete surface: touch all over"):
         empty.ops.tactile.export_report(filepath=str(page))
     assert not page.exists()
-
-
-def test_patches_are_drawn_above_the_surface_in_which_they_would_lie(empty):
-    empty.ops.mesh.primitive_plane_add()
-    plane = empty.context.object
-    empty.ops.tactile.pick(target=plane.name, location=(0.1, 0.2, 0.0), new=True)
-    (patch,) = empty.context.object.children
-    patch.tactile_colors = "deviation"
-    assert not patch.modifiers
-    empty.ops.tactile.touch_all_over(target=plane.name)
-    surface = empty.context.object
-    assert "tactile_object" in surface
-    deviations = patch["tactile"]["height_std"] + surface["tactile_object"]["height_std"]
-    for obj in (patch, *patch.children):
-        assert obj.modifiers[0].strength > deviations
-    patch.tactile_colors = "mean_curvature"
-    empty.ops.tactile.pick(target=plane.name, location=(-0.5, 0.2, 0.0), new=True)
-    (other,) = empty.context.object.children
-    assert other.modifiers[0].strength > patch.modifiers[0].strength

@@ -142,3 +142,28 @@ def test_a_mesh_that_is_too_wide_or_too_narrow_ends_at_the_border_and_does_not_f
 def test_a_mesh_without_a_border_stays():
     mesh = grid_mesh()
     assert snapped_to_border(mesh, Border(np.zeros((0, 2, 3)), np.zeros((0, 3)), np.zeros((0, 3)))) is mesh
+
+
+class Unreliable(Sheet):
+    """A sheet that does not answer one ray in ten."""
+
+    rng = np.random.default_rng(0)
+
+    def ray_cast(self, *ray):
+        return super().ray_cast(*ray) if self.rng.random() > 0.1 else None
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_edges_for_which_patches_have_no_room_are_refused_with_a_sentence(seed):
+    sheet = Unreliable(SQUARE)
+    sheet.rng = np.random.default_rng(seed)
+    atlas = core.explore_object(sheet, (0.5, 0.5, 0.0), (0, 0, 1), tolerance=TOLERANCE, rng=0, most=3)
+    refused = 0
+    for share in (0.9, 0.5, 0.3, 0.1):
+        try:
+            assert len(atlas.mesh(share * atlas.reference.indicator.size).triangles)
+        except ValueError as error:
+            assert "edge: expected one for which there is room, got" in str(error)
+            refused += 1
+    assert refused
+    assert len(atlas.mesh(atlas.suggested_edge()).triangles)

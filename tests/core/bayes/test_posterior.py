@@ -168,7 +168,7 @@ def test_blind_directions_are_counted_and_named(planes, degree, blind, terms):
     """m planes through the normal hide (d - m + 1)(d - m + 2) / 2 of the terms to degree d."""
     r = touched(surfaces.torus(40, 20, 0.6), planes, noise=0.02, degree=degree)
     assert r.posterior.null_space_dimension(degree) == blind
-    named = f"These planes cannot show {blind} of the {terms} shape terms"
+    named = f"These planes cannot show {blind} of the {terms} ways to bend"
     assert (named in r.message) == (blind > 0)
 
 

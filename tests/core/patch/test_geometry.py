@@ -2,12 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The geometry of a patch under similarities, and results as members of dicts and sets."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 import surfaces
 from scipy.spatial.transform import Rotation
 
-from core import METHODS, MongePatch, SamplingPlane, explore
+from core import METHODS, MongePatch, SamplingPlane, distances, explore
 from core.patch.domain import closed_spline_domain
 from core.patch.geometry import total_absolute_curvature
 
@@ -107,3 +109,16 @@ def test_the_total_curvature_of_a_steep_bowl_is_what_its_normals_cover(k):
     bowl, disk = MongePatch(k, k, np.empty(0)), closed_spline_domain(ends, 1.0)
     wanted = 2.0 * np.pi * (1.0 - 1.0 / np.sqrt(1.0 + k**2))
     assert total_absolute_curvature(bowl, disk) == pytest.approx(wanted, rel=0.02)
+
+
+def test_distances_of_very_many_points_take_little_memory_and_are_the_same():
+    patch = MongePatch(-0.03, -0.01, [])
+    points = np.random.default_rng(0).uniform(-8.0, 8.0, (300_000, 3))
+    tracemalloc.start()
+    try:
+        found = distances(patch, points)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 40e6
+    assert np.allclose(found[::1000], [distances(patch, p[None])[0] for p in points[::1000]], atol=1e-8)

@@ -20,6 +20,7 @@ from core import (
     Contour,
     DegenerateCurvesError,
     SamplingPlane,
+    common_point,
     distances,
     mean_height_stds,
     overlapped,
@@ -237,7 +238,8 @@ GOOD = track(
         ({"weight": 1e60}, r"weight: expected a number up to 1e\+50, got 1e\+60"),
         ({"contours": "ab"}, "contours: expected a list, got 'ab'"),
         ({"contours": None}, "contours: expected a list, got None"),
-        ({"contours": [GOOD[0].points]}, "contours: expected a list of Contour, got array"),
+        ({"contours": [GOOD[0], 5]}, r"contours\[1\]: expected shape \(n, 3\), got \(\)"),
+        ({"contours": [np.eye(2)]}, r"contours\[0\]: expected shape \(n, 3\), got \(2, 2\)"),
     ],
 )
 def test_bad_arguments_are_named(change, message):
@@ -354,7 +356,7 @@ def test_a_touch_that_carries_nothing_does_not_spoil_the_others():
         ({"outward": (0, 0, 1)}, r"outward: expected shape \(1, 3\), got \(3,\)"),
         ({"outward": [(0, 0, 0)]}, "outward: expected a vector with a direction"),
         ({"contours_list": 5}, "contours_list: expected a list, got 5"),
-        ({"contours_list": [[GOOD[0].points]]}, "contours: expected a list of Contour, got array"),
+        ({"contours_list": [[5]]}, r"contours\[0\]: expected shape \(n, 3\), got \(\)"),
         ({"degree": 9}, "degree: expected a whole number"),
     ],
 )
@@ -362,6 +364,35 @@ def test_bad_arguments_of_many_are_named(change, message):
     given = {"points": [surfaces.sphere(25).point], "outward": [surfaces.sphere(25).normal]}
     with pytest.raises(ValueError, match=message):
         reconstruct_many(**(given | {"contours_list": [GOOD]} | change))
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_without_a_direction_the_outer_side_is_that_of_the_measured_normals(side):
+    ball, lengths = surfaces.sphere(25), np.linspace(0.1, 9.0, len(GOOD[0].points))[:, None]
+    felt = [replace(c, normals=side * lengths * c.points / 25.0) for c in GOOD]
+    assert reconstruct(ball.point, felt).normal @ ball.normal == pytest.approx(side, abs=1e-3)
+    (r,) = reconstruct_many([ball.point], [felt])
+    assert r.normal @ ball.normal == pytest.approx(side, abs=1e-3)
+    around = [Contour(c.points, normals=c.normals) for c in felt]
+    r = reconstruct(ball.point, [], strokes=around)
+    assert r.normal @ ball.normal == pytest.approx(side, abs=1e-2)
+
+
+def test_plain_arrays_are_contours():
+    ball, arrays = surfaces.sphere(25), [c.points for c in GOOD]
+    r = reconstruct(ball.point, arrays, outward=ball.normal)
+    (one,) = reconstruct_many([ball.point], [[a.tolist() for a in arrays]], outward=[ball.normal])
+    wanted = reconstruct(ball.point, [Contour(a) for a in arrays], outward=ball.normal)
+    for found in (r, one):
+        assert np.array_equal(found.patch.coefficients, wanted.patch.coefficients)
+    assert np.allclose(common_point(arrays)[0], ball.point, atol=1e-3)
+    words = "outward: expected a direction, because no contact has a normal, got None"
+    with pytest.raises(ValueError, match=words):
+        reconstruct(ball.point, arrays)
+    with pytest.raises(ValueError, match=words):
+        reconstruct_many([ball.point], [arrays])
+    with pytest.raises(ValueError, match=r"contours\[2\]: numbers of single precision are"):
+        reconstruct(ball.point, [*arrays[:2], np.float32(arrays[2] + 1e7)], outward=ball.normal)
 
 
 def test_curves_to_one_side_of_the_point_that_end_together_bound_no_patch():

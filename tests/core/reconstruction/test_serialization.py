@@ -118,6 +118,15 @@ def test_a_damaged_dict_is_refused_with_a_sentence(key, value):
         (["posterior", "root"], [[1.0]], "root: expected shape"),
         (["posterior", "mean"], None, "mean: expected it in the dict"),
         (["posterior"], None, "posterior: expected it in the dict"),
+        (["geometry", "frame", "axes", 0, 0], 1e300, "axes: expected a right-handed frame"),
+        (["geometry", "frame", "origin", 0], 1e20, "point: expected places within 10 radii of the origin"),
+        (["geometry", "radius"], 0.5, "domain: expected places within 10 radii of the origin"),
+        (["geometry", "domain", 0, 1], 1e30, "domain: expected places within 10 radii of the origin"),
+        (["contours", 1, "points", 0, 2], -1e9, r"contours\[1\]: expected places within 10 radii"),
+        (["patch", "coefficients", 0], 1e200, "coefficients: expected numbers up to"),
+        (["posterior", "root", 0, 0], 1e9, "root: expected numbers up to 1000 in unit radius"),
+        (["posterior", "variances", 0], 1e200, "variances: expected numbers"),
+        *((["posterior", key, 0], 1e200, f"{key}: expected numbers up to") for key in ("mean",)),
     ],
 )
 def test_what_is_wrong_is_named(path, value, words):

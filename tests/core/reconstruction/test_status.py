@@ -34,7 +34,7 @@ def test_where_all_is_well_no_warning(surface, noise):
         r = surface.fit(contours_of(surface, noise=noise, seed=seed), degree=4)
         assert r.status == "ok", r.message
         assert r.message.startswith("The patch describes its contacts.")
-        assert "These planes cannot show 3 of the 14 shape terms" in r.message
+        assert "These planes cannot show 3 of the 14 ways to bend" in r.message
 
 
 def test_heights_that_are_good_to_little():
