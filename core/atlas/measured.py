@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import SMALLEST, Array, list_of, number, unit_vector, unit_vectors
 from ..contours.contour import Contour, equal_points
+from ..reconstruction.explained import are_few, too_far
 from ..reconstruction.from_contours import reconstruct_many
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.start import TOUCH_ROUNDING, too_coarse
@@ -252,33 +253,32 @@ class _Cloud(NamedTuple):
         ended = np.where(empty.any(axis=0), empty.argmax(axis=0), RAY_PLACES)
         return domain * np.maximum(ended, 1) / RAY_PLACES
 
-    def certain_patch(self, i: int, radius: float) -> Reconstruction | None:
-        """The patch around contact i, or None if there is none, or it is uncertain or off its contacts."""
-        (r,) = self.patches([i], radius)
-        if r is None:
-            return None
-        most = self.largest or GROWN * r.radius
-        off = r.typical_miss > MISSED * max(self.noise, most)
-        return None if off or r.mean_height_std > most else r
+    def longest_sure(self, i: int, radii: list[float], last: int) -> tuple[Reconstruction | None, int]:
+        """The largest sure patch around contact i, or None; which radius it has.
 
-    def largest_patch(self, i: int, radii: list[float], last: int) -> tuple[Reconstruction | None, int]:
-        """The largest certain patch around contact i, or the smallest one, or None; which radius it has.
+        Radii are tried from long to short, but only one longer than that of the last patch, for those of
+        neighbors are of about one size. The smallest may be less certain than others.
 
-        last : which of them the last patch had, for those of neighbors are of about one size
+        last : which of the radii the last patch had
         """
-        (smallest,) = self.patches([i], radii[0])
-        if smallest is None:
-            return None, last
-        found = self.certain_patch(i, radii[last])
-        if found is None:
-            smaller = ((self.certain_patch(i, radii[k]), k) for k in range(last - 1, 0, -1))
-            return next(((r, k) for r, k in smaller if r is not None), (smallest, 0))
-        for k in range(last + 1, len(radii)):
-            larger = self.certain_patch(i, radii[k])
-            if larger is None:
-                break
-            found, last = larger, k
-        return found, last
+        for k in range(min(last + 1, len(radii) - 1), -1, -1):
+            (r,) = self.patches([i], radii[k])
+            if r is None or (k and r.mean_height_std > (self.largest or GROWN * r.radius)):
+                continue
+            if self.explains(r, self.same_sheet(i, radii[k])):
+                return r, k
+        return None, 0
+
+    def explains(self, r: Reconstruction, some: NDArray[np.intp]) -> bool:
+        """Whether a patch explains some of the contacts, those of its wall."""
+        x, y, z = r.frame.to_local(self.contacts.points[some]).T
+        surface = r.geometry.derivatives(x, y)
+        up = surface.normal[:, 2]
+        off, std = up * (z - surface.z), up * r.height_std(x, y)
+        noise = self.noise or 1.48 * float(np.median(np.abs(off)))
+        is_far = np.zeros(len(self.contacts.points), dtype=bool)
+        is_far[some] = too_far(off, std, noise)
+        return are_few(is_far[some], is_far[self.contacts.links[some]].any(axis=1))
 
     def least_radius(self) -> Generator[float, None, float]:
         """The least radius at which patches exist at half of some places, for contacts may lie in lines.
@@ -321,12 +321,12 @@ def _patches(cloud: _Cloud) -> Generator[float, None, tuple[list[Reconstruction]
     Yields the share that is covered.
     """
     radius = yield from cloud.least_radius()
-    points, radii, last = cloud.contacts.points, [radius * WIDENING**k for k in range(WIDENINGS)], 0
+    points, radii, last = cloud.contacts.points, [radius * WIDENING**k for k in range(WIDENINGS)], WIDENINGS
     left, found, tables = np.ones(len(points), dtype=bool), [], []
     for i in range(len(left)):
         if not left[i]:
             continue
-        r, last = cloud.largest_patch(i, radii, last)
+        r, last = cloud.longest_sure(i, radii, last)
         left[cloud.same_sheet(i, MISSING * radius)] = False
         if r is not None:
             found.append(r)
