@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..triangles import normalized, row_dot
@@ -126,7 +127,7 @@ def oriented(
     known : (n, 3), measured unit normals; 0 where there are none
     up : (3,), a hint, a direction to the outer side
 
-    Raises ValueError if nothing tells the outer side.
+    Raises ValueError if nothing tells the outer side, as where a gap's sides are confused.
     """
     points = np.vstack(list(strokes))
     links = _links(points, planes, [len(stroke) for stroke in strokes])
@@ -135,7 +136,19 @@ def oriented(
     normals = sides[:, None] * planes.normals
     flips, number = _winding_signs(points, normals, planes.areas, region)
     normals *= flips[region, None]
-    return normals * _global_sign(normals, known, up, number)
+    sign = _global_sign(normals, known, up, number)
+    if sign:
+        return sign * normals
+    walls = _walls(points, normals, planes.links)
+    if walls.any():
+        raise ValueError(
+            f"outward: no direction is enough where strokes around {place_text(points[walls])} are farther "
+            "apart than half the gap or wall there: make them nearer to each other, or measure normals"
+        )
+    raise ValueError(
+        "outward: expected a direction where contacts have no normals and do not close around an object, "
+        "got none"
+    )
 
 
 def _links(points: Array, planes: Planes, lengths: Sequence[int]) -> tuple[Indices, Indices, Array]:
@@ -257,33 +270,35 @@ def _winding_signs(points: Array, normals: Array, areas: Array, region: Indices)
 def _global_sign(normals: Array, known: Array | None, up: Array | None, number: float) -> float:
     """1, or -1 if normals (n, 3) face inward, as measured normals, a hint or the winding number have it.
 
-    Raises ValueError if nothing of these is decisive.
+    It is 0 if nothing of these is decisive.
     """
     if known is not None and known.any():
         return float(np.copysign(1.0, row_dot(known, normals).sum()))
     mean = 0.0 if up is None else float((normals @ up).mean())
     if number > CLOSED and abs(mean) < DECISIVE:
         return 1.0
-    if up is None:
-        raise ValueError(
-            "outward: expected a direction where contacts have no normals and do not close around an object, "
-            "got none"
-        )
-    return float(np.copysign(1.0, mean))
+    return float(np.sign(mean))
+
+
+def _walls(points: Array, normals: Array, links: Indices) -> NDArray[np.bool_]:
+    """Which contacts (n,) have the other side of a wall or gap among their neighbors, whatever the signs."""
+    i, j = np.repeat(np.arange(len(points)), LINKS), links.ravel()
+    _, bend = reflection_agreement(points, normals, i, j)
+    facing = np.abs(row_dot(normals[i], normals[j])) > FACING
+    return np.bincount(i, facing & (bend > FACING)) > 0
 
 
 def doubt_of(points: Array, normals: Array, planes: Planes) -> tuple[str, str] | None:
     """The status and a sentence that names a place, if outward normals (n, 3) of contacts are in doubt."""
     i, j = np.repeat(np.arange(len(points)), LINKS), planes.links.ravel()
-    cosine, bend = reflection_agreement(points, normals, i, j)
+    cosine, _ = reflection_agreement(points, normals, i, j)
     against = np.bincount(i, cosine < OPPOSED) * 2 > LINKS
     if against.mean() > DOUBTED:
         return "uncertain", (
             f"Normals contradict each other around {place_text(points[against])}: strokes are too far apart "
             "there, or normals are wrong."
         )
-    facing = row_dot(normals[i], normals[j]) < -FACING
-    walls = np.bincount(i, facing & (bend > FACING)) > 0
+    walls = _walls(points, normals, planes.links)
     if walls.mean() > CONFUSED:
         return "uncertain", (
             f"Strokes around {place_text(points[walls])} are farther apart than half the thickness of the "
@@ -293,7 +308,11 @@ def doubt_of(points: Array, normals: Array, planes: Planes) -> tuple[str, str] |
     return None
 
 
+def middle_of(points: Array) -> int:
+    """The index of the one of points (n, 3) that is nearest to their median."""
+    return int(np.argmin(((points - np.median(points, axis=0)) ** 2).sum(axis=1)))
+
+
 def place_text(points: Array) -> str:
-    """The one of points (n, 3) that is nearest to their median, as text in a sentence."""
-    best = points[np.argmin(((points - np.median(points, axis=0)) ** 2).sum(axis=1))]
-    return "(" + ", ".join(f"{x:.3g}" for x in best) + ")"
+    """The middle one of points (n, 3) as text in a sentence."""
+    return "(" + ", ".join(f"{x:.3g}" for x in points[middle_of(points)]) + ")"

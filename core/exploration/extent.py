@@ -280,7 +280,7 @@ def _explains(found: Exploration, noise: float) -> bool:
     r = found.result
     x, y, z = r.frame.to_local(np.concatenate([contour.points for contour in found.contours])).T
     noise = max(noise, float(r.posterior.noise) * r.radius)
-    far = too_far(z - r.height(x, y), r.height_std(x, y), noise)
+    far = too_far(z - r.height(x, y), np.hypot(r.height_std(x, y), noise))
     return are_few(far, np.append(far[1:], False))
 
 
