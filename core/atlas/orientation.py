@@ -277,7 +277,7 @@ def _global_sign(normals: Array, known: Array | None, up: Array | None, number: 
     mean = 0.0 if up is None else float((normals @ up).mean())
     if number > CLOSED and abs(mean) < DECISIVE:
         return 1.0
-    return float(np.sign(mean))
+    return 0.0 if up is None else float(np.copysign(1.0, mean))
 
 
 def _walls(points: Array, normals: Array, links: Indices) -> NDArray[np.bool_]:
