@@ -26,7 +26,7 @@ from .frontier import RimPlace
 from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
 from .object_atlas import AT_ONCE, Atlas, joined_surface
-from .orientation import doubt_of, middle_of, oriented, place_text, planes_of, sharpened
+from .orientation import doubt_of, oriented, place_text, planes_of, sharpened
 from .tetrahedra import connected_pieces
 from .unfelt import uncovered_places
 
@@ -95,15 +95,12 @@ def cover_contacts(
     reference = yield from part_of(joined_surface(found, charts, largest, contacts), 1.0, 1.0)
     places = uncovered_places(reference, charts)
     atlas = Atlas(tuple(found), charts, reference, largest, places, contacts=contacts)
-    off = yield from chunked(partial(_off_surface, atlas, noise), AT_ONCE, 1.0, *contacts[:2])
-    status, text, worst = _agreement(contacts, *off)
-    if not cloud.noise:
-        text += f" No noise was given; that of the fit is {noise:.2g}."
-    if not cloud.noise and noise > (largest or GROWN * radius):
-        doubt = doubt or ("uncertain", _scattered(noise))
-    if status != "ok":
-        atlas = replace(atlas, unexplained=_place_of(contacts, worst, radius))
-    return replace(atlas, agreement=doubt or _cavity(atlas) or (status, text))
+    off_surface = partial(_off_surface, atlas, noise)
+    distances, far = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
+    (status, text), unexplained = _agreement(contacts, distances, far, radius)
+    said = "" if cloud.noise else f" No noise was given; that of the fit is {noise:.2g}."
+    doubt = doubt or _doubt_of_surface(atlas, 0.0 if cloud.noise else noise, largest or GROWN * radius)
+    return replace(atlas, agreement=doubt or (status, text + said), unexplained=unexplained)
 
 
 def _contacts(
@@ -216,54 +213,43 @@ def _off_surface(
     return np.abs(distances), far | (row_dot(atlas.reference.normals[triangle], normals) < 0.0)
 
 
-def _place_of(contacts: MeasuredContacts, some: NDArray[np.intp], radius: float) -> tuple[RimPlace, ...]:
-    """The place in the middle of some of the contacts, for a touch of this radius."""
-    at = some[middle_of(contacts.points[some])]
-    up = vector_of(contacts.normals[at])
-    return (RimPlace(vector_of(contacts.points[at]), up, tangent_of(up, None), radius),)
-
-
-def _scattered(noise: float) -> str:
-    """The sentence about contacts whose noise was not given, and is more than patches may be uncertain."""
-    return (
-        f"Contacts are off the smallest patches by a noise of {noise:.2g}, and none was given: give it, or "
-        "check whether files or strokes are off each other."
-    )
-
-
-def _cavity(atlas: Atlas) -> tuple[str, str] | None:
-    """The status and a sentence, if what is far from a closed surface is inside of it."""
-    if atlas.uncovered or atlas.reference.indicator.values[0, 0, 0] <= 0.0:
-        return None
-    return "uncertain", (
-        "Normals point inward all around, so the contacts surround a cavity: turn the normals if they are "
-        "those of a solid."
-    )
-
-
-def _largest_cluster(which: NDArray[np.bool_], links: NDArray[np.intp]) -> NDArray[np.intp]:
-    """The most of some contacts (n,) that are side by side, as indices; links (n, k) have which ones are."""
-    i, k = np.nonzero(which[:, None] & which[links])
-    _, piece = connected_pieces(i, links[i, k], len(which))
-    return np.flatnonzero(which & (piece == np.bincount(piece[which]).argmax()))
+def _doubt_of_surface(atlas: Atlas, noise: float, most: float) -> tuple[str, str] | None:
+    """The status and a sentence, if contacts scatter by a noise above `most`, or surround a cavity."""
+    if noise > most:
+        return "uncertain", (
+            f"Contacts scatter by {noise:.2g} about the smallest patches, and no noise was given: give it, "
+            "or check whether files or strokes are off each other."
+        )
+    if not atlas.uncovered and atlas.reference.indicator.values[0, 0, 0] > 0.0:  # It is inside there.
+        return "uncertain", (
+            "Normals point inward all around, so the contacts surround a cavity: turn the normals if they "
+            "are those of a solid."
+        )
+    return None
 
 
 def _agreement(
-    contacts: MeasuredContacts, distances: Array, far: NDArray[np.bool_]
-) -> tuple[str, str, NDArray[np.intp]]:
-    """The status, a sentence, and which contacts (k,) of those that are off the surface are most together.
+    contacts: MeasuredContacts, distances: Array, far: NDArray[np.bool_], radius: float
+) -> tuple[tuple[str, str], tuple[RimPlace, ...]]:
+    """The status and a sentence on contacts that are off the surface, and where a touch would show why.
 
     Few may be off, as at sharp edges. But more side by side than a quadric has coefficients show a shape.
     """
     if not far.any():
-        return "ok", "The surface is closed, and all contacts agree with it.", np.flatnonzero(far)
-    worst = _largest_cluster(far, contacts.links)
+        return ("ok", "The surface is closed, and all contacts agree with it."), ()
+    i, k = np.nonzero(far[:, None] & far[contacts.links])
+    _, piece = connected_pieces(i, contacts.links[i, k], len(far))
+    worst = np.flatnonzero(far & (piece == np.bincount(piece[far]).argmax()))
+    at = worst[np.argmax(distances[worst])]
     off = f"{np.count_nonzero(far)} of {len(far)} contacts"
-    where = f"by up to {distances[far].max():.2g}, most together around {place_text(contacts.points[worst])}"
+    where = (
+        f"by up to {distances[far].max():.2g}, most together around {place_text(contacts.points[at, None])}"
+    )
     if far.mean() <= FEW and len(worst) <= len(QUADRIC):
-        return "ok", f"The surface is closed. All but {off} agree with it, which are off {where}.", worst
+        return ("ok", f"The surface is closed. All but {off} agree with it, which are off {where}."), ()
     text = f"{off} are off the surface or face the other way, {where}: feel more there, or give their noise."
-    return "uncertain", text, worst
+    point, up = vector_of(contacts.points[at]), vector_of(contacts.normals[at])
+    return ("uncertain", text), (RimPlace(point, up, tangent_of(up, None), radius),)
 
 
 class _Cloud(NamedTuple):
@@ -322,9 +308,8 @@ class _Cloud(NamedTuple):
         """
         for k in range(min(last + 1, len(radii) - 1), -1, -1):
             (r,) = self.patches([i], radii[k])
-            if r is None or (k and r.mean_height_std > (self.largest or GROWN * r.radius)):
-                continue
-            if self.explains(r, self.same_sheet(i, radii[k])):
+            is_certain = r is not None and (not k or r.mean_height_std <= (self.largest or GROWN * r.radius))
+            if r is not None and is_certain and self.explains(r, self.same_sheet(i, radii[k])):
                 return r, k
         return None, 0
 
@@ -338,8 +323,7 @@ class _Cloud(NamedTuple):
         """Distances (n,) of some of the contacts from a patch, measured from its tangent planes."""
         x, y, z = r.frame.to_local(self.contacts.points[some]).T
         surface = r.geometry.derivatives(x, y)
-        distances: Array = surface.normal[:, 2] * (z - surface.z)
-        return distances
+        return np.asarray(surface.normal[:, 2] * (z - surface.z))
 
     def least_radius_and_noise(self) -> Generator[float, None, tuple[float, float]]:
         """The least radius at which patches exist at half of some places, for contacts may lie in lines.
