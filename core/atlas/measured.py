@@ -45,7 +45,7 @@ OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one
 # distance, for more than this share of links, at more than this share of centers; edges have up to a ninth.
 TURNED = 0.25
 GROWN = 0.012  # Without a tolerance, patches grow up to this mean deviation, as a share of the radius.
-LARGEST_TOLERANCE = 0.1  # A patch larger than this share of the object does not show it.
+COARSEST = 0.1  # The tolerance is at most this share of the size: larger patches do not show the object.
 
 
 def atlas_of(
@@ -93,14 +93,15 @@ def cover_contacts(
     radius, noise = yield from cloud.least_radius_and_noise()
     found, charts = yield from _patches(cloud._replace(noise=noise), radius)
     reference = yield from part_of(joined_surface(found, charts, largest, contacts), 1.0, 1.0)
-    places = uncovered_places(reference, charts)
-    atlas = Atlas(tuple(found), charts, reference, largest, places, contacts=contacts)
-    off_surface = partial(_off_surface, atlas, noise)
-    distances, far = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
-    (status, text), unexplained = _agreement(contacts, distances, far, radius)
+    uncovered = uncovered_places(reference, charts)
+    atlas = Atlas(tuple(found), charts, reference, largest, uncovered, contacts=contacts)
+    distances, far = yield from chunked(partial(_off_surface, atlas, noise), AT_ONCE, 1.0, *contacts[:2])
+    worst = _largest_cluster(far, distances, contacts.links)
+    status, text = _agreement(contacts, distances, far, worst)
+    places = [_place_at(contacts, i, radius) for i in worst[:1] if status != "ok"]
     said = "" if cloud.noise else f" No noise was given; that of the fit is {noise:.2g}."
     doubt = doubt or _doubt_of_surface(atlas, 0.0 if cloud.noise else noise, largest or GROWN * radius)
-    return replace(atlas, agreement=doubt or (status, text + said), unexplained=unexplained)
+    return replace(atlas, agreement=doubt or (status, text + said), unexplained=tuple(places))
 
 
 def _contacts(
@@ -113,8 +114,7 @@ def _contacts(
     normals, planes = np.vstack(own), planes_of(points, noise)
     normals[known] = unit_vectors("normals", normals[known])
     if not known.all():
-        found = oriented([stroke.points for stroke in strokes], planes, normals, up)
-        normals[~known] = found[~known]
+        normals[~known] = oriented([stroke.points for stroke in strokes], planes, normals, up)[~known]
     else:
         _require_one_side(points, normals)
     doubt = doubt_of(points, normals, planes)
@@ -145,9 +145,10 @@ def _strokes(
         noise = max(stroke.noise or 0.0 for stroke in strokes)
     if noise > size:
         raise ValueError(f"noise: expected less than the size of what was felt, {size:.3g}, got {noise:.3g}")
-    if tolerance is not None and tolerance > LARGEST_TOLERANCE * size:
-        most = f"a tenth of the size of what was felt, {LARGEST_TOLERANCE * size:.3g}"
-        raise ValueError(f"tolerance: expected at most {most}, got {tolerance:.3g}")
+    if tolerance is not None and tolerance > COARSEST * size:
+        raise ValueError(
+            f"tolerance: expected at most {COARSEST * size:.3g}, a tenth of the size, got {tolerance:.3g}"
+        )
     return strokes, points, noise
 
 
@@ -228,28 +229,38 @@ def _doubt_of_surface(atlas: Atlas, noise: float, most: float) -> tuple[str, str
     return None
 
 
+def _largest_cluster(far: NDArray[np.bool_], distances: Array, links: NDArray[np.intp]) -> NDArray[np.intp]:
+    """The indices (k,) of most of those contacts (n,) that are side by side and off, the farthest first."""
+    i, k = np.nonzero(far[:, None] & far[links])
+    _, piece = connected_pieces(i, links[i, k], len(far))
+    cluster = np.flatnonzero(far & (piece == np.bincount(piece[far], minlength=1).argmax()))
+    return cluster[np.argsort(-distances[cluster], kind="stable")]
+
+
 def _agreement(
-    contacts: MeasuredContacts, distances: Array, far: NDArray[np.bool_], radius: float
-) -> tuple[tuple[str, str], tuple[RimPlace, ...]]:
-    """The status and a sentence on contacts that are off the surface, and where a touch would show why.
+    contacts: MeasuredContacts, distances: Array, far: NDArray[np.bool_], worst: NDArray[np.intp]
+) -> tuple[str, str]:
+    """The status and a sentence on which contacts (n,) are far off the surface, and the worst cluster (k,).
 
     Few may be off, as at sharp edges. But more side by side than a quadric has coefficients show a shape.
     """
     if not far.any():
-        return ("ok", "The surface is closed, and all contacts agree with it."), ()
-    i, k = np.nonzero(far[:, None] & far[contacts.links])
-    _, piece = connected_pieces(i, contacts.links[i, k], len(far))
-    worst = np.flatnonzero(far & (piece == np.bincount(piece[far]).argmax()))
-    at = worst[np.argmax(distances[worst])]
+        return "ok", "The surface is closed, and all contacts agree with it."
     off = f"{np.count_nonzero(far)} of {len(far)} contacts"
     where = (
-        f"by up to {distances[far].max():.2g}, most together around {place_text(contacts.points[at, None])}"
+        f"by up to {distances[far].max():.2g}, most together around {place_text(contacts.points[worst[:1]])}"
     )
     if far.mean() <= FEW and len(worst) <= len(QUADRIC):
-        return ("ok", f"The surface is closed. All but {off} agree with it, which are off {where}."), ()
-    text = f"{off} are off the surface or face the other way, {where}: feel more there, or give their noise."
-    point, up = vector_of(contacts.points[at]), vector_of(contacts.normals[at])
-    return ("uncertain", text), (RimPlace(point, up, tangent_of(up, None), radius),)
+        return "ok", f"The surface is closed. All but {off} agree with it, which are off {where}."
+    return "uncertain", (
+        f"{off} are off the surface or face the other way, {where}: feel more there, or give their noise."
+    )
+
+
+def _place_at(contacts: MeasuredContacts, i: int, radius: float) -> RimPlace:
+    """Contact i as a place for a touch of this radius."""
+    up = vector_of(contacts.normals[i])
+    return RimPlace(vector_of(contacts.points[i]), up, tangent_of(up, None), radius)
 
 
 class _Cloud(NamedTuple):

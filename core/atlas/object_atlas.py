@@ -301,7 +301,9 @@ class Atlas:
             return "uncertain", (
                 f"{wrong} of {count} rays from outside met something else than the surface: {advice}."
             )
-        return self.agreement or ("ok", "The object was felt everywhere a finger could reach.")
+        if self.agreement:
+            return self.agreement
+        return "ok", "The object was felt everywhere a finger could reach."
 
     def next_touch(self, failed: ArrayLike = ()) -> NextTouch | None:
         """Where the next touch would bring most, or None if all is covered to the tolerance and explained.

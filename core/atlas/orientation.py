@@ -207,8 +207,7 @@ def _signs_by_indicator(points: Array, normals: Array, planes: Planes) -> tuple[
     cell = float(np.clip(0.5 * np.median(planes.reach), FINEST * size, COARSEST * size))
     signs = np.ones(len(points))
     for _ in range(ROUNDS):
-        areas = (signs * planes.areas)[:, None] * normals
-        indicator = result_of(solve_poisson(points, areas, cell, np.inf))
+        indicator = result_of(solve_poisson(points, (signs * planes.areas)[:, None] * normals, cell, np.inf))
         number = indicator.at(points) - float(indicator.values[0, 0, 0])
         wrong = np.abs(number[planes.links].mean(axis=1) - 0.5) > WRONG
         if not wrong.any():
