@@ -209,8 +209,6 @@ def _signs_by_indicator(points: Array, normals: Array, planes: Planes) -> tuple[
     for _ in range(ROUNDS):
         indicator = result_of(solve_poisson(points, (signs * planes.areas)[:, None] * normals, cell, np.inf))
         number = indicator.at(points) - float(indicator.values[0, 0, 0])
-        turn = np.copysign(1.0, number.mean())  # All are turned first: a part of them would face the rest.
-        signs, number = turn * signs, turn * number
         wrong = np.abs(number[planes.links].mean(axis=1) - 0.5) > WRONG
         if not wrong.any():
             break
@@ -246,9 +244,9 @@ def doubt_of(points: Array, normals: Array, planes: Planes) -> tuple[str, str] |
             f"Normals contradict each other around {place_text(points[against])}: strokes are too far apart "
             "there, or normals are wrong."
         )
-    facing = np.abs(row_dot(normals[i], normals[j])) > FACING
-    off = np.abs(row_dot(normals[i], points[j] - points[i])) > THROUGH * planes.rms[i]
-    walls = np.bincount(i, facing & off & (bend > FACING)) > 0
+    # Contacts that are as near as their noise are of one wall.
+    apart = np.abs(row_dot(normals[i], points[j] - points[i])) > THROUGH * planes.rms[i]
+    walls = np.bincount(i, apart & (np.abs(row_dot(normals[i], normals[j])) > FACING) & (bend > FACING)) > 0
     if walls.mean() > CONFUSED:
         return "uncertain", (
             f"Strokes around {place_text(points[walls])} are farther apart than half the thickness of the "

@@ -130,7 +130,7 @@ def test_contacts_that_no_patch_explains_are_counted_and_named():
     moved[::300] *= 1.1
     atlas = core.atlas_of([core.Contour(moved, normals=ball())], noise=1e-3)
     assert atlas.status == "ok"
-    assert "All but 2 of 600 contacts agree with it, which are off by up to 0.1" in atlas.message
+    assert "All but 2 of 600 contacts agree with it, which are off by up to 0.09" in atlas.message
     assert atlas.next_touch() is None
     moved = np.where(np.linalg.norm(ball() - (0.6, 0.0, 0.8), axis=1)[:, None] < 0.22, 1.1, 1.0) * ball()
     count = np.count_nonzero(np.linalg.norm(moved, axis=1) > 1.05)
@@ -146,7 +146,7 @@ def test_contacts_that_no_patch_explains_are_counted_and_named():
 
 
 def test_a_noise_that_was_not_given_is_named():
-    assert re.search(r"No noise was given; that of the fit is 0\.001\d\.$", ball_atlas().message)
+    assert re.search(r"No noise was given; that of the fit is 0\.001\d?\.$", ball_atlas().message)
 
 
 @pytest.mark.long
