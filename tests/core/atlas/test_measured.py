@@ -132,16 +132,16 @@ def test_contacts_that_no_patch_explains_are_counted_and_named():
     assert atlas.status == "ok"
     assert "All but 2 of 600 contacts agree with it, which are off by up to 0.09" in atlas.message
     assert atlas.next_touch() is None
-    moved = np.where(np.linalg.norm(ball() - (0.6, 0.0, 0.8), axis=1)[:, None] < 0.22, 1.1, 1.0) * ball()
-    count = np.count_nonzero(np.linalg.norm(moved, axis=1) > 1.05)
+    near = np.linalg.norm(ball() - (0.6, 0.0, 0.8), axis=1) < 0.5
+    moved = (1.0 + 0.05 * near * np.random.default_rng(0).normal(size=600))[:, None] * ball()
     atlas = core.atlas_of([core.Contour(moved, normals=ball())], noise=1e-3)
     assert atlas.status == "uncertain"
     found = re.match(
         r"(\d+) of 600 contacts are off the surface or face the other way, by up to", atlas.message
     )
-    assert 6 < int(found[1]) < 3 * count
+    assert 6 < int(found[1]) <= 1.2 * np.count_nonzero(near)
     touch = atlas.next_touch()
-    assert np.linalg.norm(touch.point - np.array([0.6, 0.0, 0.8])) < 0.4
+    assert np.linalg.norm(touch.point - np.array([0.6, 0.0, 0.8])) < 0.6
     assert touch.outward @ (0.6, 0.0, 0.8) > 0.8
 
 
