@@ -95,12 +95,14 @@ def cover_contacts(
     reference = yield from part_of(joined_surface(found, charts, largest, contacts), 1.0, 1.0)
     uncovered = uncovered_places(reference, charts)
     atlas = Atlas(tuple(found), charts, reference, largest, uncovered, contacts=contacts)
-    distances, far = yield from chunked(partial(_off_surface, atlas, noise), AT_ONCE, 1.0, *contacts[:2])
+    most = largest or GROWN * radius
+    off_surface = partial(_off_surface, atlas, noise, most)
+    distances, far = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
     worst = _largest_cluster(far, distances, contacts.links)
     status, text = _agreement(contacts, distances, far, worst)
     places = [_place_at(contacts, i, radius) for i in worst[:1] if status != "ok"]
     said = "" if cloud.noise else f" No noise was given; that of the fit is {noise:.2g}."
-    doubt = doubt or _doubt_of_surface(atlas, 0.0 if cloud.noise else noise, largest or GROWN * radius)
+    doubt = doubt or _doubt_of_surface(atlas, 0.0 if cloud.noise else noise, most)
     return replace(atlas, agreement=doubt or (status, text + said), unexplained=tuple(places))
 
 
@@ -205,12 +207,15 @@ def _beyond_bend(centers: Array, contacts: Array, links: NDArray[np.intp]) -> tu
 
 
 def _off_surface(
-    atlas: Atlas, noise: float, points: Array, normals: Array
+    atlas: Atlas, noise: float, most: float, points: Array, normals: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Distances (n,) of contacts (n, 3) from the surface, and which are too far or face the other way."""
+    """Distances (n,) of contacts (n, 3) from the surface, and which are too far or face the other way.
+
+    Deviations count up to `most`, that of patches, for where there is none they would explain anything.
+    """
     distances, stds = atlas.distance(points)
     _, triangle, *_ = atlas.reference.feet(points)
-    far = too_far(distances, np.hypot(np.where(np.isfinite(stds), stds, 0.0), noise))
+    far = too_far(distances, np.hypot(np.minimum(stds, most), noise))
     return np.abs(distances), far | (row_dot(atlas.reference.normals[triangle], normals) < 0.0)
 
 
@@ -259,8 +264,8 @@ def _agreement(
 
 def _place_at(contacts: MeasuredContacts, i: int, radius: float) -> RimPlace:
     """Contact i as a place for a touch of this radius."""
-    up = vector_of(contacts.normals[i])
-    return RimPlace(vector_of(contacts.points[i]), up, tangent_of(up, None), radius)
+    point, up = vector_of(contacts.points[i]), vector_of(contacts.normals[i])
+    return RimPlace(point, up, tangent_of(up, None), radius)
 
 
 class _Cloud(NamedTuple):
@@ -395,7 +400,6 @@ def _patches(cloud: _Cloud, radius: float) -> Generator[float, None, tuple[list[
             chart, some = stacked([r], tables[-1:]), cloud.same_sheet(i, PATCHES_APART * r.radius)
             x, y, _ = chart.local(points[some], np.arange(len(some)), np.zeros(len(some), dtype=np.intp))
             left[some] &= chart.shares(x, y, np.zeros(len(some), dtype=np.intp)) > COVERED
-        left[i] = False
         yield 1.0 - float(left.mean())
     if not found:
         raise ValueError(
