@@ -214,9 +214,9 @@ def _off_surface(
     Deviations count up to `most`, that of patches, for where there is none they would explain anything.
     """
     distances, stds = atlas.distance(points)
-    _, triangle, *_ = atlas.reference.feet(points)
+    faces = atlas.reference.normals[atlas.reference.feet(points)[1]]
     far = too_far(distances, np.hypot(np.minimum(stds, most), noise))
-    return np.abs(distances), far | (row_dot(atlas.reference.normals[triangle], normals) < 0.0)
+    return np.abs(distances), far | (row_dot(faces, normals) < 0.0)
 
 
 def _doubt_of_surface(atlas: Atlas, noise: float, most: float) -> tuple[str, str] | None:
@@ -304,8 +304,10 @@ class _Cloud(NamedTuple):
 
         domain = r.domain.radii(AZIMUTHS) / r.radius
         near = self.same_sheet(i, 2.0 * r.radius)
-        shares = np.arange(1, RAY_PLACES + 1) / RAY_PLACES
-        turns = 2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
+        shares, turns = (
+            np.arange(1, RAY_PLACES + 1) / RAY_PLACES,
+            2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS,
+        )
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
         x, y = r.radius * (shares[:, None, None] * domain[:, None] * ways).reshape(-1, 2).T
         places = r.frame.origin + np.stack([x, y, r.height(x, y)], axis=1) @ r.frame.axes.T
