@@ -40,7 +40,7 @@ def test_the_robot_stops_goes_on_and_reaches_the_tolerance(robot, monkeypatch, t
     text = capsys.readouterr().out
     assert text.startswith(f"{stopped // 3} touches: ")
     assert "The robot did not reach the object." in before + text
-    assert "The surface is closed, and all contacts agree with it." in text
+    assert re.search(r"The surface is closed(, and all|\. All but \d of \d+) contacts agree with it", text)
     off, within = re.search(r"The surface is (\S+) mm off the pebble; (\d+) %", text).groups()
     assert float(off) < 0.3
     assert int(within) >= 80

@@ -4,23 +4,28 @@
 
 from collections.abc import Generator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import SMALLEST, Array, list_of, number, unit_vector, unit_vectors
-from ..contours.contour import Contour, equal_points
+from ..bayes.joint_fit import MISFIT
+from ..contours.contour import Contour, equal_points, tangent_of, vector_of
+from ..patch.monge import QUADRIC
+from ..reconstruction.explained import FEW, are_few, too_far
 from ..reconstruction.from_contours import reconstruct_many
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.start import TOUCH_ROUNDING, too_coarse
-from ..steps import part_of, result_of
+from ..steps import chunked, part_of, result_of
 from ..triangles import row_dot
 from .charts import AZIMUTHS, Charts
 from .finger import FACING
+from .frontier import RimPlace
 from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
-from .object_atlas import Atlas, joined_surface
+from .object_atlas import AT_ONCE, Atlas, joined_surface
 from .orientation import doubt_of, oriented, place_text, planes_of, sharpened
 from .tetrahedra import connected_pieces
 from .unfelt import uncovered_places
@@ -29,14 +34,10 @@ from .unfelt import uncovered_places
 FEWEST = 40  # The smallest patch has this many contacts.
 SOME_PLACES = 24  # The number of places at which it is tried how large a patch has to be.
 WIDENING, WIDENINGS = 1.4, 10  # Patches grow by this factor, at most this often.
-MISSED = 3.0  # Contacts are off a patch, in the median, by at most this multiple of what is expected.
 # Patches are at least the first share of their radius, and the second of the smallest one, from each other,
 # but for contacts that are farther out than the third, up to which a patch reaches.
 PATCHES_APART, MISSING, COVERED = 0.6, 0.6, 1.0
 RAY_PLACES = 24  # Where a patch ends is looked for at this many places on each ray.
-CHECKED = 1000  # The number of contacts that check the surface:
-OFF_STDS, OFF_CELLS = 5.0, 0.5  # they are off it by more than this many deviations and cells,
-OFF = 0.03  # and not more than this share may be off or face the other way.
 ABREAST = 8  # The number of neighbors of each contact that are to face the same way.
 SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
 OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
@@ -44,6 +45,7 @@ OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one
 # distance, for more than this share of links, at more than this share of centers; edges have up to a ninth.
 TURNED = 0.25
 GROWN = 0.012  # Without a tolerance, patches grow up to this mean deviation, as a share of the radius.
+COARSEST = 0.1  # The tolerance is at most this share of the size: larger patches do not show the object.
 
 
 def atlas_of(
@@ -84,28 +86,37 @@ def cover_contacts(
 
     largest = None if tolerance is None else number("tolerance", tolerance, above=0.0)
     noise = None if noise is None else number("noise", noise, least=0.0)
-    contacts, noise, doubt = _contacts(contours_or_strokes, outward, noise)
+    strokes, points, noise = _strokes(contours_or_strokes, noise, largest)
+    contacts, doubt = _contacts(strokes, points, outward, noise)
+    cloud = _Cloud(contacts, cKDTree(contacts.points), noise, largest)
     yield 0.0
-    found, charts = yield from _patches(_Cloud(contacts, cKDTree(contacts.points), noise, largest))
+    radius, noise = yield from cloud.least_radius_and_noise()
+    found, charts = yield from _patches(cloud._replace(noise=noise), radius)
     reference = yield from part_of(joined_surface(found, charts, largest, contacts.off), 1.0, 1.0)
-    places = uncovered_places(reference, charts)
-    atlas = Atlas(tuple(found), charts, reference, largest, places, contacts=contacts)
-    return replace(atlas, doubt=doubt or _off_contacts(atlas, contacts, noise))
+    uncovered = uncovered_places(reference, charts)
+    atlas = Atlas(tuple(found), charts, reference, largest, uncovered, contacts=contacts)
+    most = largest or GROWN * radius
+    off_surface = partial(_off_surface, atlas, noise, most)
+    distances, far = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
+    worst = _largest_cluster(far, distances, contacts.links)
+    status, text = _agreement(contacts, distances, far, worst)
+    places = [_place_at(contacts, i, radius) for i in worst[:1] if status != "ok"]
+    said = "" if cloud.noise else f" No noise was given; that of the fit is {noise:.2g}."
+    doubt = doubt or _doubt_of_surface(atlas, 0.0 if cloud.noise else noise, most)
+    return replace(atlas, agreement=doubt or (status, text + said), unexplained=tuple(places))
 
 
 def _contacts(
-    given: Sequence[ArrayLike | Contour], outward: ArrayLike | None, noise: float | None
-) -> tuple[MeasuredContacts, float, tuple[str, str] | None]:
-    """Contacts with outward normals, the noise, and why the normals are in doubt, if they are."""
-    strokes, points, noise = _strokes(given, noise)
+    strokes: list[Contour], points: Array, outward: ArrayLike | None, noise: float
+) -> tuple[MeasuredContacts, tuple[str, str] | None]:
+    """Contacts (n, 3) of strokes with outward normals, and why the normals are in doubt, if they are."""
     up = None if outward is None else unit_vector("outward", outward)
     own = [np.zeros(stroke.points.shape) if stroke.normals is None else stroke.normals for stroke in strokes]
     known = np.repeat([stroke.normals is not None for stroke in strokes], [len(some) for some in own])
     normals, planes = np.vstack(own), planes_of(points, noise)
     normals[known] = unit_vectors("normals", normals[known])
     if not known.all():
-        found = oriented([stroke.points for stroke in strokes], planes, normals, up)
-        normals[~known] = found[~known]
+        normals[~known] = oriented([stroke.points for stroke in strokes], planes, normals, up)[~known]
     else:
         _require_one_side(points, normals)
     doubt = doubt_of(points, normals, planes)
@@ -115,10 +126,12 @@ def _contacts(
         centers, points = points, points - balls[:, None] * normals
         doubt = doubt or _beyond_bend(centers, points, planes.links)
         planes = planes_of(points, noise)
-    return MeasuredContacts(points, normals, planes.reach, planes.links), noise, doubt
+    return MeasuredContacts(points, normals, planes.reach, planes.links), doubt
 
 
-def _strokes(given: Sequence[ArrayLike | Contour], noise: float | None) -> tuple[list[Contour], Array, float]:
+def _strokes(
+    given: Sequence[ArrayLike | Contour], noise: float | None, tolerance: float | None
+) -> tuple[list[Contour], Array, float]:
     """The strokes, all their contacts (n, 3) and the noise, checked."""
     strokes = [
         stroke if isinstance(stroke, Contour) else Contour(stroke)  # type: ignore[arg-type]
@@ -134,6 +147,10 @@ def _strokes(given: Sequence[ArrayLike | Contour], noise: float | None) -> tuple
         noise = max(stroke.noise or 0.0 for stroke in strokes)
     if noise > size:
         raise ValueError(f"noise: expected less than the size of what was felt, {size:.3g}, got {noise:.3g}")
+    if tolerance is not None and tolerance > COARSEST * size:
+        raise ValueError(
+            f"tolerance: expected at most {COARSEST * size:.3g}, a tenth of the size, got {tolerance:.3g}"
+        )
     return strokes, points, noise
 
 
@@ -189,21 +206,66 @@ def _beyond_bend(centers: Array, contacts: Array, links: NDArray[np.intp]) -> tu
     )
 
 
-def _off_contacts(atlas: Atlas, contacts: MeasuredContacts, noise: float) -> tuple[str, str] | None:
-    """The status and a sentence, if many contacts are off the surface or face the other way."""
-    some = np.unique(np.linspace(0, len(contacts.points) - 1, CHECKED).astype(np.intp))
-    points, normals = contacts.points[some], contacts.normals[some]
-    distance, std = atlas.distance(points)
-    _, triangle, *_ = atlas.reference.feet(points)
-    explained = OFF_STDS * np.hypot(np.where(np.isfinite(std), std, 0.0), noise)
-    off = np.abs(distance) > np.maximum(explained, OFF_CELLS * atlas.reference.indicator.cell)
-    off |= row_dot(atlas.reference.normals[triangle], normals) < 0.0
-    if off.mean() <= OFF:
-        return None
-    return "uncertain", (
-        f"{100.0 * off.mean():.0f} % of the contacts are off the surface or face the other way, as around "
-        f"{place_text(points[off])}: their normals contradict each other, or they are too far apart there."
+def _off_surface(
+    atlas: Atlas, noise: float, most: float, points: Array, normals: Array
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Distances (n,) of contacts (n, 3) from the surface, and which are too far or face the other way.
+
+    Deviations count up to `most`, that of patches, for where there is none they would explain anything.
+    """
+    distances, stds = atlas.distance(points)
+    faces = atlas.reference.normals[atlas.reference.feet(points)[1]]
+    far = too_far(distances, np.hypot(np.minimum(stds, most), noise))
+    return np.abs(distances), far | (row_dot(faces, normals) < 0.0)
+
+
+def _doubt_of_surface(atlas: Atlas, noise: float, most: float) -> tuple[str, str] | None:
+    """The status and a sentence, if contacts scatter by a noise above `most`, or surround a cavity."""
+    if noise > most:
+        return "uncertain", (
+            f"Contacts scatter by {noise:.2g} about the smallest patches, and no noise was given: give it, "
+            "or check whether files or strokes are off each other."
+        )
+    if not atlas.uncovered and atlas.reference.indicator.values[0, 0, 0] > 0.0:  # It is inside there.
+        return "uncertain", (
+            "Normals point inward all around, so the contacts surround a cavity: turn the normals if they "
+            "are those of a solid."
+        )
+    return None
+
+
+def _largest_cluster(far: NDArray[np.bool_], distances: Array, links: NDArray[np.intp]) -> NDArray[np.intp]:
+    """The indices (k,) of most of those contacts (n,) that are side by side and off, the farthest first."""
+    i, k = np.nonzero(far[:, None] & far[links])
+    _, piece = connected_pieces(i, links[i, k], len(far))
+    cluster = np.flatnonzero(far & (piece == np.bincount(piece[far], minlength=1).argmax()))
+    return cluster[np.argsort(-distances[cluster], kind="stable")]
+
+
+def _agreement(
+    contacts: MeasuredContacts, distances: Array, far: NDArray[np.bool_], worst: NDArray[np.intp]
+) -> tuple[str, str]:
+    """The status and a sentence on which contacts (n,) are far off the surface, and the worst cluster (k,).
+
+    Few may be off, as at sharp edges. But more side by side than a quadric has coefficients show a shape.
+    """
+    if not far.any():
+        return "ok", "The surface is closed, and all contacts agree with it."
+    off = f"{np.count_nonzero(far)} of {len(far)} contacts"
+    where = (
+        f"by up to {distances[far].max():.2g}, most together around {place_text(contacts.points[worst[:1]])}"
     )
+    if far.mean() <= FEW and len(worst) <= len(QUADRIC):
+        return "ok", f"The surface is closed. All but {off} agree with it, which are off {where}."
+    return "uncertain", (
+        f"{off} are off the surface or face the other way, {where}: feel more there, or give their noise."
+    )
+
+
+def _place_at(contacts: MeasuredContacts, i: int, radius: float) -> RimPlace:
+    """Contact i as a place for a touch of this radius."""
+    point, up = vector_of(contacts.points[i]), vector_of(contacts.normals[i])
+    return RimPlace(point, up, tangent_of(up, None), radius)
 
 
 class _Cloud(NamedTuple):
@@ -242,8 +304,10 @@ class _Cloud(NamedTuple):
 
         domain = r.domain.radii(AZIMUTHS) / r.radius
         near = self.same_sheet(i, 2.0 * r.radius)
-        shares = np.arange(1, RAY_PLACES + 1) / RAY_PLACES
-        turns = 2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
+        shares, turns = (
+            np.arange(1, RAY_PLACES + 1) / RAY_PLACES,
+            2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS,
+        )
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
         x, y = r.radius * (shares[:, None, None] * domain[:, None] * ways).reshape(-1, 2).T
         places = r.frame.origin + np.stack([x, y, r.height(x, y)], axis=1) @ r.frame.axes.T
@@ -252,46 +316,49 @@ class _Cloud(NamedTuple):
         ended = np.where(empty.any(axis=0), empty.argmax(axis=0), RAY_PLACES)
         return domain * np.maximum(ended, 1) / RAY_PLACES
 
-    def certain_patch(self, i: int, radius: float) -> Reconstruction | None:
-        """The patch around contact i, or None if there is none, or it is uncertain or off its contacts."""
-        (r,) = self.patches([i], radius)
-        if r is None:
-            return None
-        most = self.largest or GROWN * r.radius
-        off = r.typical_miss > MISSED * max(self.noise, most)
-        return None if off or r.mean_height_std > most else r
+    def longest_sure(self, i: int, radii: list[float], last: int) -> tuple[Reconstruction | None, int]:
+        """The largest sure patch around contact i, or None; which radius it has.
 
-    def largest_patch(self, i: int, radii: list[float], last: int) -> tuple[Reconstruction | None, int]:
-        """The largest certain patch around contact i, or the smallest one, or None; which radius it has.
+        Radii are tried from long to short, but only one longer than that of the last patch, for those of
+        neighbors are of about one size. The smallest patch may be less certain than others.
 
-        last : which of them the last patch had, for those of neighbors are of about one size
+        last : which of the radii the last patch had
         """
-        (smallest,) = self.patches([i], radii[0])
-        if smallest is None:
-            return None, last
-        found = self.certain_patch(i, radii[last])
-        if found is None:
-            smaller = ((self.certain_patch(i, radii[k]), k) for k in range(last - 1, 0, -1))
-            return next(((r, k) for r, k in smaller if r is not None), (smallest, 0))
-        for k in range(last + 1, len(radii)):
-            larger = self.certain_patch(i, radii[k])
-            if larger is None:
-                break
-            found, last = larger, k
-        return found, last
+        for k in range(min(last + 1, len(radii) - 1), -1, -1):
+            (r,) = self.patches([i], radii[k])
+            is_certain = r is not None and (not k or r.mean_height_std <= (self.largest or GROWN * r.radius))
+            if r is not None and is_certain and self.explains(r, self.same_sheet(i, radii[k])):
+                return r, k
+        return None, 0
 
-    def least_radius(self) -> Generator[float, None, float]:
+    def explains(self, r: Reconstruction, some: NDArray[np.intp]) -> bool:
+        """Whether a patch explains some of the contacts, to which it was fitted, by their noise alone."""
+        far = np.zeros(len(self.contacts.points), dtype=bool)
+        far[some] = too_far(self.distances(r, some), self.noise)
+        return are_few(far[some], far[self.contacts.links[some]].any(axis=1))
+
+    def distances(self, r: Reconstruction, some: NDArray[np.intp]) -> Array:
+        """Distances (n,) of some of the contacts from a patch, measured from its tangent planes."""
+        x, y, z = r.frame.to_local(self.contacts.points[some]).T
+        surface = r.geometry.derivatives(x, y)
+        return np.asarray(surface.normal[:, 2] * (z - surface.z))
+
+    def least_radius_and_noise(self) -> Generator[float, None, tuple[float, float]]:
         """The least radius at which patches exist at half of some places, for contacts may lie in lines.
 
-        Raises ValueError if there is none, or numbers do not hold such patches. Yields 0 after each trial.
+        Also the noise: if none was given, it is the deviation of contacts from these patches, at least MISFIT
+        of their radius. Raises ValueError if there are none, or numbers do not hold such patches. Yields 0
+        after each trial.
         """
         points = self.contacts.points
-        some = np.linspace(0, len(points) - 1, SOME_PLACES).astype(np.intp)
+        some = np.linspace(0, len(points) - 1, SOME_PLACES).astype(np.intp).tolist()
         radius = float(np.median(self.tree.query(points[some], FEWEST)[0][:, -1]))
         self._require_fine(radius)
         for _ in range(WIDENINGS):
-            if sum(r is not None for r in self.patches(some.tolist(), radius)) * 2 >= SOME_PLACES:
-                return radius
+            found = [(i, r) for i, r in zip(some, self.patches(some, radius), strict=True) if r is not None]
+            if len(found) * 2 >= SOME_PLACES:
+                off = np.concatenate([self.distances(r, self.same_sheet(i, radius)) for i, r in found])
+                return radius, self.noise or max(1.4826 * float(np.median(np.abs(off))), MISFIT * radius)
             radius *= WIDENING
             yield 0.0
         raise ValueError(
@@ -315,18 +382,19 @@ def _too_near() -> ValueError:
     )
 
 
-def _patches(cloud: _Cloud) -> Generator[float, None, tuple[list[Reconstruction], Charts]]:
+def _patches(cloud: _Cloud, radius: float) -> Generator[float, None, tuple[list[Reconstruction], Charts]]:
     """Patches and their tables, as large as they may be, at contacts that no earlier one covers.
+
+    radius : the least of a patch
 
     Yields the share that is covered.
     """
-    radius = yield from cloud.least_radius()
-    points, radii, last = cloud.contacts.points, [radius * WIDENING**k for k in range(WIDENINGS)], 0
+    points, radii, last = cloud.contacts.points, [radius * WIDENING**k for k in range(WIDENINGS)], WIDENINGS
     left, found, tables = np.ones(len(points), dtype=bool), [], []
     for i in range(len(left)):
         if not left[i]:
             continue
-        r, last = cloud.largest_patch(i, radii, last)
+        r, last = cloud.longest_sure(i, radii, last)
         left[cloud.same_sheet(i, MISSING * radius)] = False
         if r is not None:
             found.append(r)
@@ -334,6 +402,10 @@ def _patches(cloud: _Cloud) -> Generator[float, None, tuple[list[Reconstruction]
             chart, some = stacked([r], tables[-1:]), cloud.same_sheet(i, PATCHES_APART * r.radius)
             x, y, _ = chart.local(points[some], np.arange(len(some)), np.zeros(len(some), dtype=np.intp))
             left[some] &= chart.shares(x, y, np.zeros(len(some), dtype=np.intp)) > COVERED
-        left[i] = False
         yield 1.0 - float(left.mean())
+    if not found:
+        raise ValueError(
+            f"noise: expected one that explains how contacts are off smooth patches, got {cloud.noise:.3g}: "
+            "give a larger one, or leave it out"
+        )
     return found, stacked(found, tables)

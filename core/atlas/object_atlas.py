@@ -127,7 +127,8 @@ class Atlas:
     border : where a finger felt the surface end; None if there was none
     is_cut_short : whether touches ended because no more were allowed, or were stopped
     contacts : those that were measured before; None if they were felt for this atlas
-    doubt : the status and a sentence if these contradict each other or the surface
+    agreement : whether these agree with each other and the surface: a status and a sentence
+    unexplained : the place around which most of those that do not agree are together
     """
 
     patches: tuple[Reconstruction, ...]
@@ -140,7 +141,8 @@ class Atlas:
     border: Border | None = None
     is_cut_short: bool = False
     contacts: MeasuredContacts | None = None
-    doubt: tuple[str, str] | None = None
+    agreement: tuple[str, str] | None = None
+    unexplained: tuple[RimPlace, ...] = ()
 
     def __repr__(self) -> str:
         mesh, size = self.reference.mesh, self.reference.indicator.size
@@ -185,9 +187,9 @@ class Atlas:
 
     @cached_property
     def _verdict(self) -> tuple[str, str]:
-        """The status and the message of what comes first: doubt, unfelt places, thin walls, the check."""
-        if self.doubt:
-            return self.doubt
+        """The status and the message of what comes first: contacts, unfelt places, thin walls, the check."""
+        if self.agreement and self.agreement[0] != "ok":
+            return self.agreement
         if self.uncovered:
             return self._ended()
         inside = self.reference.indicator
@@ -302,22 +304,23 @@ class Atlas:
             return "uncertain", (
                 f"{wrong} of {count} rays from outside met something else than the surface: {advice}."
             )
-        if self.contacts is not None:
-            return "ok", "The surface is closed, and all contacts agree with it."
+        if self.agreement:
+            return self.agreement
         return "ok", "The object was felt everywhere a finger could reach."
 
     def next_touch(self, failed: ArrayLike = ()) -> NextTouch | None:
-        """Where the next touch would bring most, or None if all is covered to the tolerance.
+        """Where the next touch would bring most, or None if all is covered to the tolerance and explained.
 
         failed : (k, 3), points of touches that did not reach the object; the next one is elsewhere, or None
         """
         tried = finite_array("failed", failed, (None, 3), LARGEST) if np.size(failed) else np.empty((0, 3))
-        for place in sorted(self.uncovered, key=lambda place: -(place.area or place.radius)):
+        places = *self.uncovered, *self.unexplained
+        for place in sorted(places, key=lambda place: -(place.area or place.radius)):
             point, away = np.array(place.point), APART * place.radius
             if (np.linalg.norm(tried - point, axis=1) > away).all():
                 area = place.area or np.pi * place.radius**2
                 return _touch_at(point, np.array(place.normal), place.ahead, place.radius, area)
-        if self.uncovered or not self.is_rough:
+        if places or not self.is_rough:
             return None
         vertex, mesh = self._rough[1], self.reference.mesh
         patch = self.patches[mesh.patch[vertex]]

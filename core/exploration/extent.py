@@ -19,6 +19,7 @@ from ..bayes.roughness import roughness
 from ..contours.contour import EXTENT, SURFACE_STOPS, UNEXPLAINED, Contour, SamplingPlane, stops_at
 from ..contours.finger import Surface
 from ..contours.local_geometry import DegenerateCurvesError
+from ..reconstruction.explained import are_few, too_far
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
 from .options import ExplorationOptions
@@ -36,8 +37,6 @@ ROUGH = 0.03  # Then those up to this roughness are fitted: with SMOOTH, five of
 TAPS_OFF = 0.015  # over 2 %, with 0.01 there is a seventh less area.
 # There is no surface at this share of its area at most: with 0.04 a patch spans the hole of a washer.
 LARGE_GAP = 0.02
-# Of its contacts at most the share FEW are off by more than TOO_FAR deviations, and no two that are side by
-TOO_FAR, FEW = 5.0, 0.01  # side: otherwise a rib of a 25th of the radius is an error of few contacts.
 HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed --base).
 
 Answer = Reconstruction | DegenerateCurvesError
@@ -279,13 +278,12 @@ def _is_sure(found: Exploration, options: ExplorationOptions) -> bool:
 
 
 def _explains(found: Exploration, options: ExplorationOptions) -> bool:
-    """Whether few contacts are off the patch by more than TOO_FAR deviations, and none side by side."""
+    """Whether the patch explains the contacts of its contours, to the deviation that is asked for."""
     r = found.result
     x, y, z = r.frame.to_local(np.concatenate([contour.points for contour in found.contours])).T
-    noise = max(options.noise, float(r.posterior.noise) * r.radius)
-    explained = TOO_FAR * np.hypot(r.height_std(x, y), noise)
-    off = np.abs(z - r.height(x, y)) > np.maximum(explained, options.largest_std or 0.0)
-    return not (off.mean() > FEW or (off[1:] & off[:-1]).any())
+    off, noise = z - r.height(x, y), max(options.noise, float(r.posterior.noise) * r.radius)
+    far = too_far(off, np.hypot(r.height_std(x, y), noise)) & (np.abs(off) > (options.largest_std or 0.0))
+    return are_few(far, np.append(far[1:], False))
 
 
 def _sides(contour: Contour, point: Array) -> tuple[int, int]:

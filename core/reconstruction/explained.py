@@ -1,0 +1,24 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether a surface explains contacts: at most few are off it, and no two of these are side by side."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import Array
+
+# A contact is off a surface by more than TOO_FAR deviations. At most the share FEW are, and no two that are
+# side by side: otherwise a rib of a 25th of the radius is an error of few contacts, and a dent that holds 2 %
+# of an object's contacts is erased (benchmarks.measured --features).
+TOO_FAR, FEW = 5.0, 0.01
+
+
+def too_far(distances: Array, stds: Array | float) -> NDArray[np.bool_]:
+    """Which contacts (n,) are farther from a surface than these deviations (n,), or this one, explain."""
+    far: NDArray[np.bool_] = np.abs(distances) > TOO_FAR * np.asarray(stds)
+    return far
+
+
+def are_few(far: NDArray[np.bool_], beside: NDArray[np.bool_]) -> bool:
+    """Whether few contacts (n,) are too far from a surface, and none beside another; `beside` has where."""
+    return not (far.mean() > FEW or (far & beside).any())
