@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..triangles import LEAST_DIVISOR, normalized, row_dot, triangle_cross
-from .creases import SHARP
 from .meshing import Mesh
-from .tetrahedra import Indices, keyed_sides
+from .connectivity import Indices, keyed_sides
 
 # python -m benchmarks.atlas --only ring and --only egg chose these.
 SAGITTA = 80.0  # A quadric is so wide that its sagitta is this many deviations of the surface.
 LEAST = 2.0  # The least radius, in edges of the mesh; the sagitta follows from a quadric twice as wide.
 EVERY, PLACES, FEWEST = 2, 128, 6  # It is fitted to every other vertex, the nearest 128 at most, 6 at least.
+SHARP = 0.87  # Triangles on both sides of a crease are turned by 30 degrees,
 TURNED = 0.966  # Normals on both sides of a crease are turned by 15 degrees, half of what its triangles are.
 # Places are on one sheet if the cosine between their normals is more, and if the sum of both has at most the
 # share ACROSS of the way between them, which is 0 on a ball.

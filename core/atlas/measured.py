@@ -22,7 +22,7 @@ from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
 from .object_atlas import Atlas, joined_surface
 from .orientation import doubt_of, oriented, place_text, planes_of, sharpened
-from .tetrahedra import connected_pieces
+from .connectivity import connected_pieces
 from .unfelt import uncovered_places
 
 # python -m benchmarks.robot judges these.

@@ -22,7 +22,7 @@ from .charts import Charts
 from .curvature import NormalSamples, curvatures_of, sheets_of
 from .frontier import RimPlace
 from .indicator import Indicator
-from .meshing import MOST_BYTES, WALL, MeasuredContacts, Mesh, lattice_of, memory_of, meshed
+from .meshing import MOST_BYTES, WALL, MeasuredContacts, Mesh, memory_of, meshed
 from .reference_mesh import ReferenceMesh
 from .samples import indicated
 
@@ -382,8 +382,7 @@ class Atlas:
             raise ValueError(
                 f"edge: expected at most the size of what was felt, {indicator.size:.3g}, got {edge:.3g}"
             )
-        lattice, _ = lattice_of(indicator, edge)
-        memory = memory_of(*self.reference.mesh[:2], edge, lattice)
+        memory = memory_of(*self.reference.mesh[:2], edge)
         if memory > MOST_BYTES:
             raise ValueError(
                 f"edge: expected triangles that take {1e-9 * MOST_BYTES:g} GB of memory or less, got "
