@@ -27,7 +27,6 @@ from .lattice import Lattice, lattice_at_level, turned
 SMOOTH = 0.985
 FARMOVE = 0.2
 BAND = 1.5  # Patches count within this many cells of the indicator, or of the lattice, of a point.
-SIDEWAYS = 0.15  # A patch faces as the indicator does if the cosine between their normals is more.
 ALIKE = 0.87  # Normals at both ends of an edge are of one wall if the cosine between them is more.
 SOFT = 0.03  # Planes that together turn less than this do not move a vertex along themselves.
 SLACK = 0.5  # A vertex is at most this many pitches outside of its cell: a crease may be beside it.
@@ -80,7 +79,6 @@ def _sides(charts: Charts, indicator: Indicator, band: float, places: Array) -> 
     """The fields of the Sides of places (n, 3): patches within a length of these count."""
     up, count = indicator.outward(places), len(places)
     pairs = charts.pairs(places, band)
-    pairs = pairs.chosen(row_dot(pairs.normal, up[pairs.point_index]) > SIDEWAYS)
     every, side, found = nearest_sheet(charts, pairs, count), np.zeros(count), []
     none = every.patch < 0
     level = every._replace(distance=-indicator.at(places), normal=up)
