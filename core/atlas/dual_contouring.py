@@ -24,6 +24,7 @@ from .indicator import Indicator
 from .lattice import Lattice, lattice_at_level, turned
 
 # python -m benchmarks.atlas --shapes judges these.
+LEVEL = 1e-6  # The level of the indicator weighs this much beside patches.
 SMOOTH = 0.985
 FARMOVE = 0.2
 BAND = 1.5  # Patches count within this many cells of the indicator, or of the lattice, of a point.
@@ -67,7 +68,7 @@ def dual_contour(charts: Charts, indicator: Indicator, pitch: float) -> Generato
     cells, index = np.unique(quads, return_inverse=True)
     quads = index.reshape(-1, 4)
     yield 0.7
-    vertices, up = _vertices(quads, places, planes.normal, lattice.places(cells), pitch)
+    vertices, up = _vertices(quads, places, planes, lattice.places(cells), pitch)
     yield 0.8
     own = _least_uncertain(quads, planes, len(cells))
     move = partial(_on_sheet, charts, band)
@@ -128,7 +129,8 @@ def _sides_of_points(
 def _planes(lattice: Lattice, sides: Sides, points: Indices, edges: Indices) -> tuple[Array, Blend]:
     """Where the surface crosses edges (n,), (n, 3), and the sheets there.
 
-    At a convex crease it is the first plane of both ends from inside, and the last at a concave one.
+    At a convex crease it is the first plane of both ends from inside, and the last at a concave one. Where
+    the plane of neither end crosses the edge, it is the level of the indicator, which has no patch.
     """
     one, other = lattice.ends(edges)
     inside = lattice.inside(one)
@@ -137,28 +139,32 @@ def _planes(lattice: Lattice, sides: Sides, points: Indices, edges: Indices) -> 
     b = Blend(*(values[np.searchsorted(points, end)] for values in sides.outside))
     origin = lattice.places(start)
     way = lattice.places(end) - origin
-    # Where only one end has a patch, its plane goes on to the other.
-    lone_a, lone_b = (a.patch < 0) & (b.patch >= 0), (b.patch < 0) & (a.patch >= 0)
     at_end, at_start = a.distance + row_dot(a.normal, way), b.distance - row_dot(b.normal, way)
-    a, b = b._replace(distance=at_start).where(lone_a, a), a._replace(distance=at_end).where(lone_b, b)
-    at_end, at_start = a.distance + row_dot(a.normal, way), b.distance - row_dot(b.normal, way)
-    share = _zero(a.distance, b.distance)
-    of_a, of_b = _zero(a.distance, at_end), _zero(at_start, b.distance)
-    foot_a, foot_b = -a.distance[:, None] * a.normal, way - b.distance[:, None] * b.normal
-    apart = foot_b - foot_a
+    share, of_a, of_b = _zero(a.distance, b.distance), _zero(a.distance, at_end), _zero(at_start, b.distance)
+    by_a, by_b = (
+        (sheet.patch >= 0) & (last > first) & (np.abs(at - 0.5) < 0.5 + SLACK)
+        for sheet, first, last, at in ((a, a.distance, at_end, of_a), (b, at_start, b.distance, of_b))
+    )
+    apart = way - b.distance[:, None] * b.normal + a.distance[:, None] * a.normal
     is_convex = row_dot(b.normal - a.normal, apart) > 0.0
-    is_first = np.where((at_end > 0.0) & (at_start < 0.0), (of_a <= of_b) == is_convex, at_end > 0.0)
-    one_wall = row_dot(a.normal, b.normal) > ALIKE
-    share = np.where(one_wall, share, np.where(is_first, of_a, of_b))
-    found = a.where(np.where(one_wall, a.std <= b.std, is_first), b)
-    blend = normalized(a.normal + share[:, None] * (b.normal - a.normal))
+    is_a = np.where(by_a & by_b, (of_a <= of_b) == is_convex, by_a)
+    found, at = a.where(is_a, b), np.where(is_a, of_a, of_b)
+    level = lattice.indicator.at(origin), lattice.indicator.at(origin + way)
+    at = np.where(by_a | by_b, at, np.clip(_zero(*level), 0.0, 1.0))
+    one_wall = by_a & by_b & (row_dot(a.normal, b.normal) > ALIKE)
+    at = np.where(one_wall, np.clip(share, 0.0, 1.0), at)
+    blend = normalized(a.normal + at[:, None] * (b.normal - a.normal))
+    places = origin + at[:, None] * way
+    none = ~by_a & ~by_b
     normal = np.where(one_wall[:, None], blend, found.normal)
-    return origin + share[:, None] * way, found._replace(normal=normal)
+    normal[none] = lattice.indicator.outward(places[none])
+    found = found._replace(normal=normal, std=np.where(none, np.inf, found.std), patch=np.where(none, -1, found.patch), rho=np.where(none, np.inf, found.rho))
+    return places, found
 
 
 def _zero(a: Array, b: Array) -> Array:
     """The share of the way from values a (n,) to values b (n,) where a line between them is 0."""
-    return np.clip(a / np.where(a == b, 1.0, a - b), 0.0, 1.0)
+    return a / np.where(a == b, 1.0, a - b)
 
 
 def _least_uncertain(quads: Indices, planes: Blend, count: int) -> Blend:
@@ -169,18 +175,19 @@ def _least_uncertain(quads: Indices, planes: Blend, count: int) -> Blend:
     return Blend(*(values[best] for values in planes))
 
 
-def _vertices(quads: Indices, places: Array, normals: Array, corners: Array, pitch: float) -> tuple[Array, Array]:
+def _vertices(quads: Indices, places: Array, planes: Blend, corners: Array, pitch: float) -> tuple[Array, Array]:
     """The vertices (m, 3) of cells whose lowest corners are given, (m, 3), and mean normals (m, 3) there.
 
-    quads : (n, 4), the cells around planes (n,) through places with normals, (n, 3) each
+    quads : (n, 4), the cells around planes (n,) through places (n, 3)
     """
-    count = len(corners)
+    count, normals = len(corners), planes.normal
+    weights = np.repeat(np.where(planes.patch < 0, LEVEL, 1.0), 4)
+    total = np.bincount(quads.ravel(), weights, count)
 
     def mean(values: Array) -> Array:
         """Means (m,) over the planes around each cell."""
-        return np.bincount(quads.ravel(), np.repeat(values, 4), count) / times
+        return np.bincount(quads.ravel(), weights * np.repeat(values, 4), count) / total
 
-    times = np.bincount(quads.ravel(), minlength=count)
     middle, up = (np.stack([mean(v) for v in values.T], axis=1) for values in (places, normals))
     square = np.empty((count, 3, 3))
     for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)):
