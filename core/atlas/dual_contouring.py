@@ -24,6 +24,7 @@ from .indicator import Indicator
 from .lattice import Lattice, lattice_at_level, turned
 
 # python -m benchmarks.atlas --shapes judges these.
+ROUNDED = 1.0
 LEVEL = 1e-6  # The level of the indicator weighs this much beside patches.
 SMOOTH = 0.985
 FARMOVE = 0.2
@@ -47,11 +48,17 @@ class Sides(NamedTuple):
 
 
 class Surface(NamedTuple):
-    """Vertices (n, 3) and triangles (m, 3), counterclockwise from outside, and the sheets at the vertices."""
+    """Vertices (n, 3) and triangles (m, 3), counterclockwise from outside.
+
+    std, patch : (n,), the deviation of the surface, and the patch of most weight; inf and -1 where none is
+    rho : (m,), how far out triangles are on the patch where they are least so; inf where no patch is
+    """
 
     vertices: Array
     triangles: Indices
-    sheet: Blend
+    std: Array
+    patch: Indices
+    rho: Array
 
 
 def dual_contour(charts: Charts, indicator: Indicator, pitch: float) -> Generator[float, None, Surface]:
@@ -73,7 +80,7 @@ def dual_contour(charts: Charts, indicator: Indicator, pitch: float) -> Generato
     own = _least_uncertain(quads, planes, len(cells))
     move = partial(_on_sheet, charts, band)
     vertices, *sheet = yield from chunked(move, PLACES_AT_ONCE, 0.9, vertices, up, *own)
-    return Surface(vertices, _cut(vertices, quads, planes.normal), Blend(*sheet))
+    return Surface(vertices, _cut(vertices, quads, planes.normal), sheet[1], sheet[3], np.tile(planes.rho, 2))
 
 
 def _sides(charts: Charts, indicator: Indicator, band: float, places: Array) -> tuple[Array, ...]:
@@ -89,7 +96,7 @@ def _sides(charts: Charts, indicator: Indicator, band: float, places: Array) -> 
         sheet = nearest_sheet(charts, some, count)
         side += np.where(sheet.patch < 0, 0.0, way)
         found += [*sheet.where(sheet.patch >= 0, every)]
-    return *found, side
+    return *found, np.where(np.abs(every.distance) < ROUNDED * indicator.cell, side, 0.0)
 
 
 def _sides_of_points(

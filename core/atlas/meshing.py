@@ -14,8 +14,7 @@ from ..triangles import normalized, triangle_cross
 from .charts import Charts
 from .connectivity import Indices, connected_pieces, keyed_sides
 from .dual_contouring import PLACES_AT_ONCE, Surface, dual_contour
-from .field import INSIDE
-from .finger import FACING
+from .field import AGREE, INSIDE
 from .indicator import Indicator
 
 # python -m benchmarks.atlas judges these.
@@ -111,7 +110,7 @@ class MeasuredContacts(NamedTuple):
         from scipy.spatial import cKDTree
 
         away, at = cKDTree(self.points).query(points, NEAREST)
-        alike = np.einsum("kbi,ki->kb", self.normals[at], normals) > FACING
+        alike = np.einsum("kbi,ki->kb", self.normals[at], normals) > AGREE
         ways = normalized(self.points[self.links[at]] - points[:, None, None])
         between = np.linalg.norm(ways.mean(axis=2), axis=2) < ONE_SIDED
         return (alike & between & (away < BETWEEN * self.reach[at])).any(axis=1)
@@ -160,26 +159,24 @@ def _trim_unfelt(
     off the first.
     """
     yield 0.9
-    (vertices, triangles, sheet), far = surface, surface.sheet.patch < 0
-    inside = sheet.rho < INSIDE
-    beyond = triangles[~inside[triangles].all(axis=1)]
+    vertices, triangles, std, patch, rho = surface
+    is_beyond, middles = rho >= INSIDE, vertices[triangles].mean(axis=1)
+    beyond, inside = triangles[is_beyond], triangles[~is_beyond]
     count, piece = connected_pieces(beyond[:, :2].ravel(), beyond[:, 1:].ravel(), len(vertices))
     yield 0.9
-    meets_inside = np.bincount(piece[inside], minlength=count) > 0
-    gone = ~inside & ~meets_inside[piece]
+    gone = np.bincount(piece[inside.ravel()], minlength=count) == 0
+    where = piece[beyond[:, 0]]
     if ended is None:
-        # Each vertex has a third of its triangles' area, so that a hole is as large with any length of edges.
-        areas = np.linalg.norm(triangle_cross(vertices[beyond]), axis=1) / 6.0 * far[beyond].sum(axis=1)
-        gone |= ~inside & (np.bincount(piece[beyond[:, 0]], areas, count) > BRIDGED * indicator.cell**2)[piece]
+        areas = 0.5 * np.linalg.norm(triangle_cross(vertices[beyond]), axis=1) * np.isinf(rho[is_beyond])
+        gone |= np.bincount(where, areas, count) > BRIDGED * indicator.cell**2
     else:
-        outer = np.flatnonzero(~inside & ~gone)
-        (off,) = yield from chunked(lambda some: (ended(some),), PLACES_AT_ONCE, 0.9, vertices[outer])
-        gone[outer] = (np.bincount(piece[outer], np.where(off, 1.0, -1.0), count) > 0.0)[piece[outer]]
+        (off,) = yield from chunked(lambda some: (ended(some),), PLACES_AT_ONCE, 0.9, middles[is_beyond])
+        gone |= np.bincount(where, np.where(off, 1.0, -1.0), count) > 0.0
     yield 0.9
-    some = np.flatnonzero(gone)
+    unfelt = np.flatnonzero(is_beyond)[gone[where]]
     if contacts is not None:
-        gone[some] = ~contacts.near(vertices[some], indicator.outward(vertices[some]))
-    std = np.where(far, indicator.cell, sheet.std)
-    std[some] = np.hypot(std[some], indicator.cell)  # No patch is there.
-    mesh, unfelt = Mesh(vertices, triangles, std, sheet.patch), gone[triangles].any(axis=1)
-    return mesh.chosen(~unfelt), mesh.chosen(unfelt)
+        normals = normalized(triangle_cross(vertices[triangles[unfelt]]))
+        unfelt = unfelt[~contacts.near(middles[unfelt], normals)]
+    std, is_unfelt = np.where(patch < 0, indicator.cell, std), np.bincount(unfelt, minlength=len(triangles)) > 0
+    mesh = Mesh(vertices, triangles, std, patch)
+    return mesh.chosen(~is_unfelt), mesh.chosen(is_unfelt)
