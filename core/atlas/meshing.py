@@ -167,7 +167,8 @@ def _trim_unfelt(
     gone = np.bincount(piece[inside.ravel()], minlength=count) == 0
     where = piece[beyond[:, 0]]
     if ended is None:
-        areas = 0.5 * np.linalg.norm(triangle_cross(vertices[beyond]), axis=1) * np.isinf(rho[is_beyond])
+        areas = 0.5 * np.linalg.norm(triangle_cross(vertices[beyond]), axis=1)
+        areas *= (patch[beyond] < 0).any(axis=1)
         gone |= np.bincount(where, areas, count) > BRIDGED * indicator.cell**2
     else:
         (off,) = yield from chunked(lambda some: (ended(some),), PLACES_AT_ONCE, 0.9, middles[is_beyond])
