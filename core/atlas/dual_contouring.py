@@ -25,13 +25,13 @@ from .lattice import Lattice, lattice_at_level, turned
 
 # python -m benchmarks.atlas --shapes judges these.
 ROUNDED = 1.0
+VALID = 1.0
 LEVEL = 1e-6  # The level of the indicator weighs this much beside patches.
-SMOOTH = 0.985
-FARMOVE = 0.2
+FACING = 0.95  # A sheet faces as a vertex does if the cosine between their normals is more.
 BAND = 1.5  # Patches count within this many cells of the indicator, or of the lattice, of a point.
 ALIKE = 0.87  # Normals at both ends of an edge are of one wall if the cosine between them is more.
 SOFT = 0.03  # Planes that together turn less than this do not move a vertex along themselves.
-SLACK = 0.5  # A vertex is at most this many pitches outside of its cell: a crease may be beside it.
+SLACK = 1.0  # A vertex is at most this many pitches outside of its cell: a crease may be beside it.
 SWEEPS = 12  # A vertex that is held in its cell is moved along each axis this often.
 PLACES_AT_ONCE = 3000  # A step takes this many places.
 
@@ -78,7 +78,7 @@ def dual_contour(charts: Charts, indicator: Indicator, pitch: float) -> Generato
     vertices, up = _vertices(quads, places, planes, lattice.places(cells), pitch)
     yield 0.8
     own = _least_uncertain(quads, planes, len(cells))
-    move = partial(_on_sheet, charts, band)
+    move = partial(_on_sheet, charts, SLACK * pitch)
     vertices, *sheet = yield from chunked(move, PLACES_AT_ONCE, 0.9, vertices, up, *own)
     return Surface(vertices, _cut(vertices, quads, planes.normal), sheet[1], sheet[3], np.tile(planes.rho, 2))
 
@@ -148,10 +148,13 @@ def _planes(lattice: Lattice, sides: Sides, points: Indices, edges: Indices) -> 
     way = lattice.places(end) - origin
     at_end, at_start = a.distance + row_dot(a.normal, way), b.distance - row_dot(b.normal, way)
     share, of_a, of_b = _zero(a.distance, b.distance), _zero(a.distance, at_end), _zero(at_start, b.distance)
-    by_a, by_b = (
-        (sheet.patch >= 0) & (last > first) & (np.abs(at - 0.5) < 0.5 + SLACK)
-        for sheet, first, last, at in ((a, a.distance, at_end, of_a), (b, at_start, b.distance, of_b))
+    missed = np.array(
+        [
+            np.where((sheet.patch >= 0) & (last > first), np.maximum(np.abs(at - 0.5) - 0.5, 0.0), np.inf)
+            for sheet, first, last, at in ((a, a.distance, at_end, of_a), (b, at_start, b.distance, of_b))
+        ]
     )
+    by_a, by_b = (missed <= missed.min(axis=0)) & (missed < VALID)
     apart = way - b.distance[:, None] * b.normal + a.distance[:, None] * a.normal
     is_convex = row_dot(b.normal - a.normal, apart) > 0.0
     is_a = np.where(by_a & by_b, (of_a <= of_b) == is_convex, by_a)
@@ -216,15 +219,21 @@ def _vertices(quads: Indices, places: Array, planes: Blend, corners: Array, pitc
     return middle + step, up
 
 
-def _on_sheet(charts: Charts, band: float, vertices: Array, up: Array, *own: Array) -> tuple[Array, ...]:
-    """Vertices (n, 3) of one wall moved onto its sheet, and the fields of the sheets at them.
+def _on_sheet(
+    charts: Charts, reach: float, vertices: Array, up: Array, *own: Array
+) -> tuple[Array, ...]:
+    """Vertices (n, 3) moved onto the sheet that faces as they do, and the fields of the sheets at them.
 
-    up : (n, 3), mean normals of planes; own : the fields of the sheets of vertices on creases
+    On a crease none does: what is left there are the sheets of its planes.
+
+    reach : vertices within this length of the sheet move
+    up : (n, 3), mean normals of planes; own : the fields of the sheets of one of these
     """
-    sheet = sheet_facing(charts, vertices, normalized(up), band)
-    smooth = (np.linalg.norm(up, axis=1) > SMOOTH) & (sheet.patch >= 0) & (np.abs(sheet.distance) < FARMOVE * band)
-    moved = vertices - np.where(smooth, sheet.distance, 0.0)[:, None] * sheet.normal
-    return moved, *sheet.where(smooth, Blend(*own))
+    up = normalized(up)
+    sheet = sheet_facing(charts, vertices, up, 2.0 * reach)
+    is_facing = (row_dot(sheet.normal, up) > FACING) & (np.abs(sheet.distance) < reach)
+    moved = vertices - np.where(is_facing, sheet.distance, 0.0)[:, None] * sheet.normal
+    return moved, *sheet.where(is_facing, Blend(*own))
 
 
 def _cut(vertices: Array, quads: Indices, normals: Array) -> Indices:
