@@ -25,7 +25,7 @@ from .lattice import Lattice, lattice_at_level, turned
 
 # python -m benchmarks.atlas --shapes judges these.
 ROUNDED = 1.0
-VALID = 1.0
+VALID = 0.5
 LEVEL = 1e-6  # The level of the indicator weighs this much beside patches.
 FACING = 0.95  # A sheet faces as a vertex does if the cosine between their normals is more.
 BAND = 1.5  # Patches count within this many cells of the indicator, or of the lattice, of a point.
