@@ -19,16 +19,15 @@ from ..steps import chunked
 from ..triangles import normalized, row_dot, triangle_cross
 from .charts import Charts
 from .connectivity import Indices
-from .field import Blend, nearest_sheet, sheet_facing
+from .field import INSIDE, Blend, nearest_sheet, sheet_facing
 from .indicator import Indicator
 from .lattice import Lattice, lattice_at_level, turned
 
 # python -m benchmarks.atlas --shapes judges these.
-ROUNDED = 1.0
 VALID = 0.5
 LEVEL = 1e-6  # The level of the indicator weighs this much beside patches.
 FACING = 0.95  # A sheet faces as a vertex does if the cosine between their normals is more.
-BAND = 1.5  # Patches count within this many cells of the indicator, or of the lattice, of a point.
+BAND = 2.0  # Patches count within this many cells of the indicator, or of the lattice, of a point.
 ALIKE = 0.87  # Normals at both ends of an edge are of one wall if the cosine between them is more.
 SOFT = 0.03  # Planes that together turn less than this do not move a vertex along themselves.
 SLACK = 1.0  # A vertex is at most this many pitches outside of its cell: a crease may be beside it.
@@ -85,18 +84,15 @@ def dual_contour(charts: Charts, indicator: Indicator, pitch: float) -> Generato
 
 def _sides(charts: Charts, indicator: Indicator, band: float, places: Array) -> tuple[Array, ...]:
     """The fields of the Sides of places (n, 3): patches within a length of these count."""
-    up, count = indicator.outward(places), len(places)
-    pairs = charts.pairs(places, band)
+    pairs, count = charts.pairs(places, band), len(places)
     every, side, found = nearest_sheet(charts, pairs, count), np.zeros(count), []
-    none = every.patch < 0
-    level = every._replace(distance=-indicator.at(places), normal=up)
-    every = level.where(none, every)
     for way in (-1.0, 1.0):
         some = pairs.chosen(np.sign(pairs.distance) == way)
         sheet = nearest_sheet(charts, some, count)
         side += np.where(sheet.patch < 0, 0.0, way)
         found += [*sheet.where(sheet.patch >= 0, every)]
-    return *found, np.where(np.abs(every.distance) < ROUNDED * indicator.cell, side, 0.0)
+    is_near = (every.rho < INSIDE) & (np.abs(every.distance) < indicator.cell)
+    return *found, np.where(is_near, side, 0.0)
 
 
 def _sides_of_points(
@@ -147,7 +143,7 @@ def _planes(lattice: Lattice, sides: Sides, points: Indices, edges: Indices) -> 
     origin = lattice.places(start)
     way = lattice.places(end) - origin
     at_end, at_start = a.distance + row_dot(a.normal, way), b.distance - row_dot(b.normal, way)
-    share, of_a, of_b = _zero(a.distance, b.distance), _zero(a.distance, at_end), _zero(at_start, b.distance)
+    of_a, of_b = _zero(a.distance, at_end), _zero(at_start, b.distance)
     missed = np.array(
         [
             np.where((sheet.patch >= 0) & (last > first), np.maximum(np.abs(at - 0.5) - 0.5, 0.0), np.inf)
@@ -157,19 +153,14 @@ def _planes(lattice: Lattice, sides: Sides, points: Indices, edges: Indices) -> 
     by_a, by_b = (missed <= missed.min(axis=0)) & (missed < VALID)
     apart = way - b.distance[:, None] * b.normal + a.distance[:, None] * a.normal
     is_convex = row_dot(b.normal - a.normal, apart) > 0.0
-    is_a = np.where(by_a & by_b, (of_a <= of_b) == is_convex, by_a)
+    is_a = by_a & ~by_b
     found, at = a.where(is_a, b), np.where(is_a, of_a, of_b)
-    level = lattice.indicator.at(origin), lattice.indicator.at(origin + way)
-    at = np.where(by_a | by_b, at, np.clip(_zero(*level), 0.0, 1.0))
-    one_wall = by_a & by_b & (row_dot(a.normal, b.normal) > ALIKE)
-    at = np.where(one_wall, np.clip(share, 0.0, 1.0), at)
-    blend = normalized(a.normal + at[:, None] * (b.normal - a.normal))
-    places = origin + at[:, None] * way
+    level = np.clip(_zero(lattice.indicator.at(origin), lattice.indicator.at(origin + way)), 0.0, 1.0)
     none = ~by_a & ~by_b
-    normal = np.where(one_wall[:, None], blend, found.normal)
-    normal[none] = lattice.indicator.outward(places[none])
-    found = found._replace(normal=normal, std=np.where(none, np.inf, found.std), patch=np.where(none, -1, found.patch), rho=np.where(none, np.inf, found.rho))
-    return places, found
+    places = origin + np.where(none, level, at)[:, None] * way
+    up = lattice.indicator.outward(places)
+    unfelt = Blend(level, np.full(len(at), np.inf), up, np.full(len(at), -1), np.full(len(at), np.inf))
+    return places, unfelt.where(none, found)
 
 
 def _zero(a: Array, b: Array) -> Array:
