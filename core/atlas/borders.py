@@ -18,9 +18,9 @@ from ..arguments import Array
 from ..contours.contour import vector_of
 from ..contours.finger import Contact
 from ..triangles import LEAST_DIVISOR, normalized, row_dot
+from .connectivity import Indices, split_sides
 from .finger import Finger
 from .meshing import Mesh
-from .connectivity import Indices, split_sides
 
 # python -m benchmarks.atlas judges these.
 REACH, STEP = 6.0, 0.5  # A border is looked for within this many edges of the mesh's, in such steps,

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..triangles import LEAST_DIVISOR, normalized, row_dot, triangle_cross
-from .meshing import Mesh
 from .connectivity import Indices, keyed_sides
+from .meshing import Mesh
 
 # python -m benchmarks.atlas --only ring and --only egg chose these.
 SAGITTA = 80.0  # A quadric is so wide that its sagitta is this many deviations of the surface.

@@ -96,12 +96,18 @@ def sheet_facing(charts: Charts, points: Array, up: Array, near: Array | float) 
     return _weighted_mean(pairs, node_weights(charts, pairs) * alike, len(points))
 
 
+def distances_within_rims(charts: Charts, pairs: Pairs) -> Array:
+    """The distances (m,) of places from patches that end at their rims, or a little more."""
+    beyond = np.maximum(pairs.rho - 1.0, 0.0) * charts.radii[pairs.patch] * charts.widths[pairs.patch]
+    return np.hypot(pairs.distance, beyond)
+
+
 def nearest_sheet(charts: Charts, pairs: Pairs, count: int) -> Blend:
     """The sheet of the nearest patch at each of `count` places, of pairs of places and patches."""
-    radius = charts.radii[pairs.patch]
-    beyond = np.maximum(pairs.rho - 1.0, 0.0) * radius * charts._extents[0][pairs.patch]
-    nearest = argmin_per_point(pairs.point_index, np.hypot(pairs.distance, beyond), count)[pairs.point_index]
-    alike = facing_alike(charts, pairs, pairs.normal[nearest], pairs.distance[nearest], radius[nearest])
+    nearest = argmin_per_point(pairs.point_index, distances_within_rims(charts, pairs), count)
+    nearest = nearest[pairs.point_index]
+    up, radius = pairs.normal[nearest], charts.radii[pairs.patch[nearest]]
+    alike = facing_alike(charts, pairs, up, pairs.distance[nearest], radius)
     return _weighted_mean(pairs, node_weights(charts, pairs) * alike, count)
 
 

@@ -17,12 +17,12 @@ from ..reconstruction.start import TOUCH_ROUNDING, too_coarse
 from ..steps import part_of, result_of
 from ..triangles import row_dot
 from .charts import AZIMUTHS, Charts
+from .connectivity import connected_pieces
 from .finger import FACING
 from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
 from .object_atlas import Atlas, joined_surface
 from .orientation import doubt_of, oriented, place_text, planes_of, sharpened
-from .connectivity import connected_pieces
 from .unfelt import uncovered_places
 
 # python -m benchmarks.robot judges these.

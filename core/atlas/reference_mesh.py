@@ -14,10 +14,10 @@ from ..arguments import Array
 from ..contours.contour import Vector
 from ..triangles import LEAST_DIVISOR, normalized, row_dot, triangle_cross
 from .charts import Charts
+from .connectivity import Indices
 from .field import Blend, sheet_facing
 from .indicator import Indicator
 from .meshing import Mesh
-from .connectivity import Indices
 
 # python -m benchmarks.atlas judges these.
 NEAREST = 3  # The nearest triangle is looked for at this many of the nearest vertices.
