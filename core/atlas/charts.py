@@ -77,9 +77,7 @@ class Charts:
         found = [self._pairs_at(points, reach, *some) for some in self._candidates(points, reach)]
         return Pairs(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
-    def _candidates(
-        self, points: Array, reach: Array
-    ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    def _candidates(self, points: Array, reach: Array) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         """Pairs of places and patches that may be within reach, sorted by place, about CHUNK at once."""
         from scipy.spatial.distance import cdist
 

@@ -7,9 +7,9 @@ to the planes of the patches along its edges: on walls, creases and at corners t
 the lattice between inside and outside gets a quadrilateral between the vertices of its four cells.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -94,31 +94,25 @@ def _turned_at_creases(
     """
     lattice, edges = yield from lattice_at_level(indicator, pitch)
     layers, band = int(np.ceil(indicator.cell / pitch)) + 1, BAND * max(indicator.cell, pitch)
-    points, fields = np.zeros(0, dtype=np.intp), []
-    for layer in range(layers + 1):
-        new = np.setdiff1d(lattice.ends(edges), points)
-        some = partial(_sides, charts, indicator.cell, band)
-        parts = yield from chunked(some, PLACES_AT_ONCE, 0.6, lattice.places(new))
-        order = np.argsort(np.append(points, new), kind="stable")
-        points = np.append(points, new)[order]
-        fields = [np.concatenate(each)[order] for each in zip(fields or _none(parts), parts, strict=True)]
+    some = partial(_sides, charts, indicator.cell, band)
+    points = np.unique(lattice.ends(edges))
+    fields = yield from chunked(some, PLACES_AT_ONCE, 0.6, lattice.places(points))
+    for _ in range(layers):
         side = fields[-1]
         wrong = points[(side != 0.0) & ((side < 0.0) != lattice.inside(points))]
-        lattice, done = turned(lattice, wrong[:0] if layer == layers else wrong)
-        if not len(done):
-            break
+        lattice, done = turned(lattice, wrong)
         edges = lattice.crossed(np.union1d(edges, lattice.edges_around(done)))
-        yield 0.6
+        new = np.setdiff1d(lattice.ends(edges), points)
+        parts = yield from chunked(some, PLACES_AT_ONCE, 0.6, lattice.places(new))
+        points = np.append(points, new)
+        order = np.argsort(points, kind="stable")
+        points = points[order]
+        fields = tuple(np.concatenate(both)[order] for both in zip(fields, parts, strict=True))
     half = len(Blend._fields)
-    return lattice, edges, Sides(points, Blend(*fields[:half]), Blend(*fields[half:-1]), side)
+    return lattice, edges, Sides(points, Blend(*fields[:half]), Blend(*fields[half:-1]), fields[-1])
 
 
-def _none(fields: Sequence[Array]) -> list[Array]:
-    """Fields of no points."""
-    return [values[:0] for values in fields]
-
-
-def _sides(charts: Charts, cell: float, band: float, places: Array) -> tuple[Array, ...]:
+def _sides(charts: Charts, cell: float, band: float, places: Array) -> tuple[Any, ...]:
     """The fields of the Sides of places (n, 3), by the patches within a length of these.
 
     cell : only places that are nearer to a patch have a side
@@ -143,8 +137,8 @@ def _planes(lattice: Lattice, sides: Sides, edges: Indices) -> tuple[Array, Blen
     one, other = lattice.ends(edges)
     is_inside = lattice.inside(one)
     inner, outer = np.where(is_inside, one, other), np.where(is_inside, other, one)
-    a = Blend(*(values[np.searchsorted(sides.points, inner)] for values in sides.inside))
-    b = Blend(*(values[np.searchsorted(sides.points, outer)] for values in sides.outside))
+    a = sides.inside.at(np.searchsorted(sides.points, inner))
+    b = sides.outside.at(np.searchsorted(sides.points, outer))
     origin = lattice.places(inner)
     way = lattice.places(outer) - origin
     from_a, missed_a = _crossing(a, a.distance, a.distance + row_dot(a.normal, way))
@@ -178,7 +172,7 @@ def _least_uncertain(quads: Indices, planes: Blend, count: int) -> Blend:
     order = np.argsort(-planes.std, kind="stable")
     best = np.zeros(count, dtype=np.intp)
     best[quads[order]] = order[:, None]
-    return Blend(*(values[best] for values in planes))
+    return planes.at(best)
 
 
 def _vertices(
@@ -213,7 +207,7 @@ def _vertices(
 
 
 def _held(square: Array, right: Array, low: Array, high: Array) -> Array:
-    """The x (m, 3) between `low` and `high` that minimize x' square x / 2 - right' x, by coordinate descent."""
+    """The x (m, 3) from `low` to `high` that minimize x' square x / 2 - right' x, by coordinate descent."""
     x = np.clip(0.0 * right, low, high)
     for _ in range(SWEEPS):
         for i in range(3):
@@ -222,7 +216,7 @@ def _held(square: Array, right: Array, low: Array, high: Array) -> Array:
     return x
 
 
-def _on_sheet(charts: Charts, reach: float, vertices: Array, up: Array, *own: Array) -> tuple[Array, ...]:
+def _on_sheet(charts: Charts, reach: float, vertices: Array, up: Array, *own: Any) -> tuple[Any, ...]:
     """Vertices (n, 3) moved onto the sheets that face as they do, and the fields of these.
 
     On a crease no sheet does: there vertices stay, and have the fields of their planes.

@@ -43,6 +43,10 @@ class Blend(NamedTuple):
     patch: NDArray[np.intp]
     rho: Array
 
+    def at(self, index: NDArray[np.intp]) -> "Blend":
+        """The sheets at some of the places, by their indices (m,)."""
+        return Blend._make(values[index] for values in self)
+
     def where(self, which: NDArray[np.bool_], other: "Blend") -> "Blend":
         """These at places (k,) where `which` holds, and those of another elsewhere."""
         columns = which[:, None]

@@ -87,7 +87,7 @@ class Lattice(NamedTuple):
 
 
 def lattice_at_level(indicator: Indicator, pitch: float) -> Generator[float, None, tuple[Lattice, Indices]]:
-    """A well-composed lattice of a pitch, and its edges (n,) whose ends differ; yields 0 between its steps."""
+    """A well-composed lattice of a pitch, and its edges (n,) whose ends differ; yields 0 in between."""
     length, ratio = len(indicator.values), indicator.cell / pitch
     shape = tuple(int(np.ceil((count - 1) * ratio)) + 4 for count in indicator.values.shape)
     lattice, found = Lattice(indicator, pitch, shape, np.zeros(0, dtype=np.intp)), []
@@ -132,7 +132,7 @@ def _edges_near(lattice: Lattice, low: Array, high: Array) -> Indices:
 
 
 def composed(lattice: Lattice, cells: Indices) -> Lattice:
-    """The lattice with points turned inside until all of these cells (n,) and those beside are well-composed."""
+    """The lattice with points turned inside until these cells (n,), and all beside, are well-composed."""
     is_composed, corner = _cases()
     while len(cells):
         codes = lattice.codes(cells)

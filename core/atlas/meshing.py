@@ -178,6 +178,6 @@ def _trim_unfelt(
     if contacts is not None:
         normals = normalized(triangle_cross(vertices[triangles[unfelt]]))
         unfelt = unfelt[~contacts.near(middles[unfelt], normals)]
-    std, is_unfelt = np.where(patch < 0, indicator.cell, std), np.bincount(unfelt, minlength=len(triangles)) > 0
-    mesh = Mesh(vertices, triangles, std, patch)
+    mesh = Mesh(vertices, triangles, np.where(patch < 0, indicator.cell, std), patch)
+    is_unfelt = np.bincount(unfelt, minlength=len(triangles)) > 0
     return mesh.chosen(~is_unfelt), mesh.chosen(is_unfelt)
