@@ -20,6 +20,7 @@ from .borders import Border, snapped_to_border
 from .boundaries import Edge, edges_of, gaussian_curvature_of, node_dict
 from .charts import Charts
 from .curvature import NormalSamples, curvatures_of, sheets_of
+from .field import Blend, sheet_facing
 from .frontier import RimPlace
 from .indicator import Indicator
 from .meshing import MOST_BYTES, WALL, MeasuredContacts, Mesh, memory_of, meshed
@@ -370,7 +371,13 @@ class Atlas:
 
     @cached_property
     def _sheets(self) -> NormalSamples:
-        return sheets_of(self.reference.mesh)
+        mesh = self.reference.mesh
+        normals = mesh.normals
+        steps = chunked(
+            lambda *some: sheet_facing(self.charts, *some, near), AT_ONCE, 1.0, mesh.vertices, normals
+        )
+        sheet = Blend._make(result_of(steps))
+        return sheets_of(mesh, np.where(sheet.patch[:, None] < 0, normals, sheet.normal))
 
     def meshing(self, edge: float) -> Generator[float, None, Mesh]:
         """Makes the `mesh` in steps: yields the share that is done, and returns the mesh.
