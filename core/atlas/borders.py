@@ -76,7 +76,9 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
     above = yield from off(corners + INWARD * (middles - corners), before)
     above_middle = yield from off(middles, before)
     # At a corner that juts out the finger feels the surface at both places, at one that goes in, at neither.
-    sharp &= np.isnan(above) == np.isnan(above_middle)
+    # Where the mesh has the corner already, both are on the border, and it may feel any.
+    away = np.linalg.norm(corners[:, None] - np.stack([a, b], axis=1), axis=2).min(axis=1)
+    sharp &= (np.isnan(above) == np.isnan(above_middle)) | (away < STRAIGHT * mesh.edge)
     corners += np.nan_to_num(above)[:, None] * normals[before]
     yield 0.0
     c, one, two = corners[sharp], ways[before], ways[after]

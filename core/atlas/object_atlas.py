@@ -373,10 +373,8 @@ class Atlas:
     def _sheets(self) -> NormalSamples:
         mesh = self.reference.mesh
         normals = mesh.normals
-        steps = chunked(
-            lambda *some: sheet_facing(self.charts, *some, near), AT_ONCE, 1.0, mesh.vertices, normals
-        )
-        sheet = Blend._make(result_of(steps))
+        some = partial(sheet_facing, self.charts, near=self.reference.edge)
+        sheet = Blend._make(result_of(chunked(some, AT_ONCE, 1.0, mesh.vertices, normals)))
         return sheets_of(mesh, np.where(sheet.patch[:, None] < 0, normals, sheet.normal))
 
     def meshing(self, edge: float) -> Generator[float, None, Mesh]:
