@@ -81,7 +81,8 @@ def dual_contour(charts: Charts, indicator: Indicator, pitch: float) -> Generato
     vertices, *fields = yield from steps
     sheet = Blend(*fields)
     triangles = _cut(vertices, quads, planes.normal)
-    return Surface(vertices, triangles, sheet.std, sheet.patch, np.tile(planes.rho, 2))
+    rho = np.minimum(np.tile(planes.rho, 2), sheet.rho[triangles].min(axis=1))
+    return Surface(vertices, triangles, sheet.std, sheet.patch, rho)
 
 
 def _turned_at_creases(
