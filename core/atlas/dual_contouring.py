@@ -51,7 +51,7 @@ class Surface(NamedTuple):
     """Vertices (n, 3) and triangles (m, 3), counterclockwise from outside.
 
     std, patch : (n,), the deviation of the surface, and the patch of most weight; inf and -1 where none is
-    rho : (m,), how far out triangles are on the patch where they are least so; inf where no patch is
+    rho, triangle_rho : (n,) and (m,), how far out they are on the patch where they are least so, or inf
     """
 
     vertices: Array
@@ -59,6 +59,7 @@ class Surface(NamedTuple):
     std: Array
     patch: Indices
     rho: Array
+    triangle_rho: Array
 
 
 def dual_contour(charts: Charts, indicator: Indicator, pitch: float) -> Generator[float, None, Surface]:
@@ -81,8 +82,7 @@ def dual_contour(charts: Charts, indicator: Indicator, pitch: float) -> Generato
     vertices, *fields = yield from steps
     sheet = Blend(*fields)
     triangles = _cut(vertices, quads, planes.normal)
-    rho = np.minimum(np.tile(planes.rho, 2), sheet.rho[triangles].min(axis=1))
-    return Surface(vertices, triangles, sheet.std, sheet.patch, rho)
+    return Surface(vertices, triangles, sheet.std, sheet.patch, sheet.rho, np.tile(planes.rho, 2))
 
 
 def _turned_at_creases(

@@ -159,8 +159,8 @@ def _trim_unfelt(
     off the first.
     """
     yield 0.9
-    vertices, triangles, std, patch, rho = surface
-    is_beyond, middles = rho >= INSIDE, vertices[triangles].mean(axis=1)
+    vertices, triangles, std, patch, rho, triangle_rho = surface
+    is_beyond, middles = triangle_rho >= INSIDE, vertices[triangles].mean(axis=1)
     beyond, inside = triangles[is_beyond], triangles[~is_beyond]
     count, piece = connected_pieces(beyond[:, :2].ravel(), beyond[:, 1:].ravel(), len(vertices))
     yield 0.9
@@ -168,7 +168,7 @@ def _trim_unfelt(
     where = piece[beyond[:, 0]]
     if ended is None:
         areas = 0.5 * np.linalg.norm(triangle_cross(vertices[beyond]), axis=1)
-        areas *= (patch[beyond] < 0).any(axis=1)
+        areas *= (rho[beyond] >= INSIDE).all(axis=1)
         gone |= np.bincount(where, areas, count) > BRIDGED * indicator.cell**2
     else:
         (off,) = yield from chunked(lambda some: (ended(some),), PLACES_AT_ONCE, 0.9, middles[is_beyond])
