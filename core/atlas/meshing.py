@@ -167,9 +167,13 @@ def _trim_unfelt(
     gone = np.bincount(piece[inside.ravel()], minlength=count) == 0
     where = piece[beyond[:, 0]]
     if ended is None:
-        areas = 0.5 * np.linalg.norm(triangle_cross(vertices[beyond]), axis=1)
-        areas *= (rho[beyond] >= INSIDE).all(axis=1)
-        gone |= np.bincount(where, areas, count) > BRIDGED * indicator.cell**2
+        # A hole is as large with any length of edges; along creases there are many that are tiny.
+        is_hole = (rho[beyond] >= INSIDE).all(axis=1)
+        holes, some = connected_pieces(*beyond[is_hole][:, [0, 1, 1, 2]].reshape(-1, 2).T, len(vertices))
+        areas = 0.5 * np.linalg.norm(triangle_cross(vertices[beyond[is_hole]]), axis=1)
+        hole = some[beyond[is_hole, 0]]
+        is_large = np.bincount(hole, areas, holes)[hole] > BRIDGED * indicator.cell**2
+        gone[where[is_hole][is_large]] = True
     else:
         (off,) = yield from chunked(lambda some: (ended(some),), PLACES_AT_ONCE, 0.9, middles[is_beyond])
         gone |= np.bincount(where, np.where(off, 1.0, -1.0), count) > 0.0
