@@ -168,7 +168,7 @@ def _trim_unfelt(
     where = piece[beyond[:, 0]]
     if ended is None:
         # A hole is as large with any length of edges; along creases there are many that are tiny.
-        is_hole = (rho[beyond] >= INSIDE).all(axis=1)
+        is_hole = np.isinf(rho[beyond]).all(axis=1)
         holes, some = connected_pieces(*beyond[is_hole][:, [0, 1, 1, 2]].reshape(-1, 2).T, len(vertices))
         areas = 0.5 * np.linalg.norm(triangle_cross(vertices[beyond[is_hole]]), axis=1)
         hole = some[beyond[is_hole, 0]]
