@@ -24,7 +24,7 @@ ONE_SIDED = 0.82  # if the mean of the directions to these is shorter; it is 2 /
 BRIDGED = 4.0  # Holes that are not larger than this many cells of the indicator are bridged.
 WALL = 0.25  # Edges are at most this share of the thinnest wall, so that none is lost between them.
 # The square of an edge takes so much memory, and a mesh takes at most so much.
-EDGE_BYTES, MOST_BYTES = 900.0, 2e9
+EDGE_BYTES, MOST_BYTES = 1300.0, 2e9
 
 
 class Mesh(NamedTuple):
