@@ -26,7 +26,7 @@ from .lattice import Lattice, lattice_at_level, turned
 BAND = 1.5  # Patches count within this many cells of the indicator, or pitches, of a point.
 CROSSED = 0.5  # A plane that passes an edge by so many pitches counts as well, if no other crosses it.
 SLACK = 1.0  # A vertex is at most this many pitches outside of its cell: the tip of a crease may be there.
-SOFT = 0.03  # A vertex does not move along planes that turn so little, as mean squares of their sines.
+SOFT = 0.02  # A vertex does not move along planes that turn so little, as mean squares of their sines.
 SWEEPS = 12  # A vertex that is held near its cell is moved along each axis this often.
 LEVEL = 1e-6  # The weight of the indicator's level beside planes of patches.
 FACING = 0.95  # A sheet faces as the planes of a vertex do if the cosine between their normals is more.
