@@ -36,8 +36,8 @@ from time import process_time
 import numpy as np
 
 import core
-from core.atlas.field import surface_at
-from core.atlas.meshing import BAND
+from core.atlas.dual_contouring import BAND
+from core.atlas.field import sheet_facing
 from core.atlas.touching import SIZE
 from tests import solids
 from tools import blender
@@ -176,8 +176,8 @@ def agreeing(thing, atlas):
 
     def surface(at):
         """Normals (n, 3) of the joined surface near points (n, 3): the field's, or those of the mesh."""
-        up, inside = atlas.reference.normals[atlas.reference.feet(at)[1]], atlas.reference.indicator
-        found = surface_at(atlas.charts, inside, at, up, BAND * inside.cell)
+        up, near = atlas.reference.normals[atlas.reference.feet(at)[1]], BAND * atlas.reference.indicator.cell
+        found = sheet_facing(atlas.charts, at, up, near)
         return np.where(found.patch[:, None] < 0, up, found.normal)
 
     some = points[np.random.default_rng(0).permutation(len(points))[:POINTS]]

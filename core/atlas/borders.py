@@ -18,9 +18,9 @@ from ..arguments import Array
 from ..contours.contour import vector_of
 from ..contours.finger import Contact
 from ..triangles import LEAST_DIVISOR, normalized, row_dot
+from .connectivity import Indices, split_sides
 from .finger import Finger
 from .meshing import Mesh
-from .tetrahedra import Indices, split_sides
 
 # python -m benchmarks.atlas judges these.
 REACH, STEP = 6.0, 0.5  # A border is looked for within this many edges of the mesh's, in such steps,
@@ -76,7 +76,9 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
     above = yield from off(corners + INWARD * (middles - corners), before)
     above_middle = yield from off(middles, before)
     # At a corner that juts out the finger feels the surface at both places, at one that goes in, at neither.
-    sharp &= np.isnan(above) == np.isnan(above_middle)
+    # Where the mesh has the corner already, both are on the border, and it may feel any.
+    away = np.linalg.norm(corners[:, None] - np.stack([a, b], axis=1), axis=2).min(axis=1)
+    sharp &= (np.isnan(above) == np.isnan(above_middle)) | (away < STRAIGHT * mesh.edge)
     corners += np.nan_to_num(above)[:, None] * normals[before]
     yield 0.0
     c, one, two = corners[sharp], ways[before], ways[after]

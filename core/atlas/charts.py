@@ -71,25 +71,18 @@ class Charts:
     stds: Array
     rims: Array
 
-    def pairs(self, points: Array, near: float = np.inf, margin: float = MARGIN) -> Pairs:
-        """Pairs of places (k, 3) and the patches within the length `near`, and within REACH, of them.
-
-        margin : how far out a patch counts, as a share of its domain's radius
-        """
+    def pairs(self, points: Array, near: float = np.inf) -> Pairs:
+        """Pairs of places (k, 3) and the patches within the length `near`, and within REACH, of them."""
         reach = np.minimum(REACH, near / self.radii)
-        found = [
-            self._pairs_at(points, reach, margin, *some) for some in self._candidates(points, reach, margin)
-        ]
+        found = [self._pairs_at(points, reach, *some) for some in self._candidates(points, reach)]
         return Pairs(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
-    def _candidates(
-        self, points: Array, reach: Array, margin: float
-    ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    def _candidates(self, points: Array, reach: Array) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         """Pairs of places and patches that may be within reach, sorted by place, about CHUNK at once."""
         from scipy.spatial.distance import cdist
 
         across, along = self._extents
-        rows, reaches = CHUNK // 16, self.radii * np.hypot(margin * across, along + reach)
+        rows, reaches = CHUNK // 16, self.radii * np.hypot(MARGIN * across, along + reach)
         for start in range(0, max(len(points), 1), rows):
             some = points[start : start + rows]
             low, high = some.min(axis=0, initial=np.inf), some.max(axis=0, initial=-np.inf)
@@ -99,9 +92,14 @@ class Charts:
             yield start + place, patch[which]
 
     @cached_property
+    def widths(self) -> Array:
+        """The largest radius of each domain, (n,), in unit radius."""
+        return self.rims.max(axis=1)
+
+    @cached_property
     def _extents(self) -> Array:
         """How far patches go across and along their normals, (2, n), in unit radius."""
-        return np.array([self.rims.max(axis=1), np.abs(self.heights).max(axis=(1, 2)).clip(max=1.5)])
+        return np.array([self.widths, np.abs(self.heights).max(axis=(1, 2)).clip(max=1.5)])
 
     def local(self, points: Array, place: NDArray[np.intp], patch: NDArray[np.intp]) -> Array:
         """Places in the frames of patches and in unit radius, (3, m)."""
@@ -133,16 +131,15 @@ class Charts:
         self,
         points: Array,
         reach: Array,
-        margin: float,
         place: NDArray[np.intp],
         patch: NDArray[np.intp],
     ) -> Pairs:
         """Those of these pairs that are within reach (n,), measured from the tangent plane at each foot."""
         x, y, z = self.local(points, place, patch)
         across, along = self._extents
-        across, along = margin * across + reach, along + reach
+        across, along = MARGIN * across + reach, along + reach
         which = np.flatnonzero((x * x + y * y < across[patch] ** 2) & (np.abs(z) < along[patch]))
-        which = which[self.shares(x[which], y[which], patch[which]) < (margin + reach)[patch[which]]]
+        which = which[self.shares(x[which], y[which], patch[which]) < (MARGIN + reach)[patch[which]]]
         place, patch, (x, y, z) = place[which], patch[which], np.array([x, y, z])[:, which]
         h, hx, hy = self._heights(x, y, patch)
         off = (z - h) / (1.0 + hx**2 + hy**2)
@@ -150,7 +147,7 @@ class Charts:
         rho = self.shares(foot_x, foot_y, patch)
         # The foot of a place on a slope is nearer than the surface below it.
         near = np.abs(off) * np.sqrt(1.0 + hx**2 + hy**2) < reach[patch]
-        which = np.flatnonzero((rho < margin) & near)
+        which = np.flatnonzero((rho < MARGIN) & near)
         place, patch, rho = place[which], patch[which], rho[which]
         x, y, z, foot_x, foot_y = np.array([x, y, z, foot_x, foot_y])[:, which]
         h, hx, hy = self._heights(foot_x, foot_y, patch)

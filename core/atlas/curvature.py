@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..triangles import LEAST_DIVISOR, normalized, row_dot, triangle_cross
-from .creases import SHARP
+from .connectivity import Indices, keyed_sides
 from .meshing import Mesh
-from .tetrahedra import Indices, keyed_sides
 
 # python -m benchmarks.atlas --only ring and --only egg chose these.
 SAGITTA = 80.0  # A quadric is so wide that its sagitta is this many deviations of the surface.
 LEAST = 2.0  # The least radius, in edges of the mesh; the sagitta follows from a quadric twice as wide.
-EVERY, PLACES, FEWEST = 2, 128, 6  # It is fitted to every other vertex, the nearest 128 at most, 6 at least.
+# It is fitted to every other vertex, which are chosen by a seed, to the nearest 128 at most and 6 at least.
+EVERY, PLACES, FEWEST, SEED = 2, 128, 6, 0
+SHARP = 0.87  # Triangles on both sides of a crease are turned by 30 degrees,
 TURNED = 0.966  # Normals on both sides of a crease are turned by 15 degrees, half of what its triangles are.
 # Places are on one sheet if the cosine between their normals is more, and if the sum of both has at most the
 # share ACROSS of the way between them, which is 0 on a ball.
@@ -56,13 +57,14 @@ class Curvatures(NamedTuple):
     mean_std: Array
 
 
-def sheets_of(mesh: Mesh) -> NormalSamples:
-    """The places and the ends of a mesh."""
+def sheets_of(mesh: Mesh, normals: Array) -> NormalSamples:
+    """The places and the ends of a mesh; `normals` (n, 3) are those of the surface at its vertices."""
     from scipy.spatial import cKDTree
 
-    normals = mesh.normals
-    trees = cKDTree(mesh.vertices[::EVERY]), cKDTree(mesh.vertices[np.unique(_ends(mesh, normals))])
-    return NormalSamples(trees[0], normals[::EVERY], mesh.std[::EVERY], trees[1], mesh.edge)
+    # In the order of a mesh every other vertex may be on one of two walls.
+    some = np.random.default_rng(SEED).permutation(len(normals))[::EVERY]
+    ends = cKDTree(mesh.vertices[np.unique(_ends(mesh, mesh.normals))])
+    return NormalSamples(cKDTree(mesh.vertices[some]), normals[some], mesh.std[some], ends, mesh.edge)
 
 
 def _ends(mesh: Mesh, normals: Array) -> Indices:

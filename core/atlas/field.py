@@ -1,11 +1,9 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The surface of many patches near a place: sheets, and the creases where these meet.
+"""The surface of many patches near a place: sheets of patches that face much alike.
 
-Not in the paper. Which way the surface faces follows from the indicator of the whole object. Patches that
-face much alike are one sheet: a partition of unity with the weights of Ohtake et al. 2003 over each patch's
-variance. Where sheets meet, the inside is in both (a convex crease) or in either (a concave one), as the
-indicator has it on both sides of the crease.
+Not in the paper. A sheet is a partition of unity with the weights of Ohtake et al. 2003 over each patch's
+variance.
 """
 
 from typing import Any, NamedTuple
@@ -16,7 +14,6 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from ..triangles import normalized, row_dot
 from .charts import MARGIN, Charts, Pairs
-from .indicator import Indicator
 
 # python -m benchmarks.atlas judges these.
 OUTERMOST = 0.999  # Weights beyond this share of MARGIN are those there, so that none is 0.
@@ -29,42 +26,15 @@ FLAT_AGREE, FLAT_APART = 0.87, 0.75  # Those of flat patches, of 30 and 41 degre
 # more.
 LAYER, SLANT = 0.15, 0.5
 INSIDE = 1.0  # A patch covers what is within this share of its domain's radius.
-SIDEWAYS = 0.15  # A patch faces as the indicator does if the cosine between their normals is more.
-CONTINUED = 1.6  # Where no patch is, those count that can be continued by this factor of their radius.
-FARTHEST = 10.0  # A crease is looked for within this many cells along the normals of its sheets.
-LEAST_SINE = 0.1  # Sheets of a crease count as turned by this much at least.
-SHEETS = 3  # At most this many sheets meet at a place.
 
 
 class Blend(NamedTuple):
-    """A sheet, or the surface, near k places.
+    """A sheet near k places.
 
     distance, std : (k,), signed, and its deviation; 0 and inf where no patch reaches
     normal : (k, 3), the gradient
     patch : (k,), index of the patch of most weight; -1 where no patch reaches
-    """
-
-    distance: Array
-    std: Array
-    normal: Array
-    patch: NDArray[np.intp]
-
-    def where(self, which: NDArray[np.bool_], other: "Blend") -> "Blend":
-        """These at places (k,) where `which` holds, and those of another elsewhere."""
-        return Blend(
-            np.where(which, self.distance, other.distance),
-            np.where(which, self.std, other.std),
-            np.where(which[:, None], self.normal, other.normal),
-            np.where(which, self.patch, other.patch),
-        )
-
-
-class SurfaceSample(NamedTuple):
-    """The surface near k places.
-
-    distance, std, normal, patch : as in a Blend
     rho : (k,), how far out the places are on the patch where they are least so; inf where no patch reaches
-    creases : (k,), the number of other sheets there
     """
 
     distance: Array
@@ -72,7 +42,20 @@ class SurfaceSample(NamedTuple):
     normal: Array
     patch: NDArray[np.intp]
     rho: Array
-    creases: NDArray[np.intp]
+
+    def at(self, index: NDArray[np.intp]) -> "Blend":
+        """The sheets at some of the places, by their indices (m,)."""
+        return Blend._make(values[index] for values in self)
+
+    def where(self, which: NDArray[np.bool_], other: "Blend") -> "Blend":
+        """These at places (k,) where `which` holds, and those of another elsewhere."""
+        columns = which[:, None]
+        return Blend(
+            *(
+                np.where(columns if mine.ndim > 1 else which, mine, others)
+                for mine, others in zip(self, other, strict=True)
+            )
+        )
 
 
 def node_weights(charts: Charts, pairs: Pairs) -> Array:
@@ -110,93 +93,26 @@ def _within(off: Array, band: Array) -> Array:
     return inside * inside
 
 
-def sheets_at(charts: Charts, pairs: Pairs, count: int) -> list[Blend]:
-    """At most SHEETS sheets at each of `count` places, the nearest first, of pairs of places and patches."""
-    weights, sheets = node_weights(charts, pairs), []
-    for _ in range(SHEETS):
-        key = np.abs(pairs.distance) + 0.5 * LAYER * charts.radii[pairs.patch] * pairs.rho**2
-        nearest = argmin_per_point(pairs.point_index, key, count)[pairs.point_index]
-        up, offset, radius = (
-            pairs.normal[nearest],
-            pairs.distance[nearest],
-            charts.radii[pairs.patch[nearest]],
-        )
-        alike = facing_alike(charts, pairs, up, offset, radius)
-        sheets.append(_weighted_mean(pairs, weights * alike, count))
-        left = np.flatnonzero(alike <= 0.0)
-        pairs, weights = pairs.chosen(left), weights[left]
-    return sheets
-
-
-def surface_at(charts: Charts, indicator: Indicator, points: Array, up: Array, band: float) -> SurfaceSample:
-    """The surface within a length of places (k, 3) that faces about as `up` (k, 3)."""
-    found = surface_within_margin(charts, indicator, points, up, band)
-    lost = np.flatnonzero(found.patch < 0)
-    if len(lost):
-        farther = surface_within_margin(charts, indicator, points[lost], up[lost], band, CONTINUED)
-        for old, new in zip(found, farther, strict=True):
-            old[lost] = new
-    return found
-
-
-def surface_within_margin(
-    charts: Charts, indicator: Indicator, points: Array, up: Array, band: float, margin: float = MARGIN
-) -> SurfaceSample:
-    """The surface of `surface_at`, but only of patches within a margin of their rims."""
-    pairs, count = charts.pairs(points, band, margin), len(points)
-    pairs = pairs.chosen(row_dot(pairs.normal, up[pairs.point_index]) > SIDEWAYS)
-    rho = np.full(count, np.inf)
-    np.minimum.at(rho, pairs.point_index, pairs.rho)
-    sheets = sheets_at(charts, pairs, count)
-    found, several = sheets[0], np.flatnonzero(sheets[1].patch >= 0)
-    if len(several):
-        some = [Blend._make(values[several] for values in sheet) for sheet in sheets]
-        for old, new in zip(found, _combine_sheets(indicator, points[several], some), strict=True):
-            old[several] = new
-    return SurfaceSample(*found, rho, (sheets[1].patch >= 0).astype(np.intp) + (sheets[2].patch >= 0))
-
-
-def _combine_sheets(indicator: Indicator, points: Array, sheets: list[Blend]) -> Blend:
-    """The surface where two or three sheets (k places each) meet, (k,).
-
-    The inside of a convex crease is the intersection of both half spaces, so the larger signed distance
-    counts; that of a concave one is their union, so the smaller one does. At a corner the pair whose crease
-    differs from the other two is combined first.
-    """
-    one, two, three = sheets
-    convex = [_is_convex(indicator, points, a, b) for a, b in ((one, two), (one, three), (two, three))]
-    third = three.patch >= 0
-    # Of three creases at a corner two are alike: the sheets of the other one meet first.
-    last = third & (convex[0] == convex[1]) & (convex[0] != convex[2])
-    middle = third & (convex[0] == convex[2]) & (convex[0] != convex[1])
-    a, b, c = two.where(last, one), three.where(last | middle, two), one.where(last, two.where(middle, three))
-    first = np.where(last, convex[2], np.where(middle, convex[1], convex[0]))
-    found = _min_or_max(a, b, first)
-    return _min_or_max(found, c, np.where(last | middle, convex[0], convex[1])).where(third, found)
-
-
-def _min_or_max(a: Blend, b: Blend, convex: NDArray[np.bool_]) -> Blend:
-    """The surface of two sheets, inside both where their crease is convex, and inside either elsewhere."""
-    return b.where((b.distance > a.distance) == convex, a)
-
-
-def _is_convex(indicator: Indicator, points: Array, a: Blend, b: Blend) -> NDArray[np.bool_]:
-    """Whether the crease of two sheets near places (k, 3) is convex: on both sides of it is the outside."""
-    cosine = row_dot(a.normal, b.normal)
-    sine = np.maximum(1.0 - cosine**2, LEAST_SINE**2)
-    most = FARTHEST * indicator.cell
-    p, q = (np.clip((u.distance - cosine * v.distance) / sine, -most, most) for u, v in ((a, b), (b, a)))
-    crease = points - p[:, None] * a.normal - q[:, None] * b.normal
-    across = a.normal - b.normal
-    across *= indicator.cell / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), LEAST_SINE)
-    return indicator.at(crease + across) + indicator.at(crease - across) < 0.0
-
-
 def sheet_facing(charts: Charts, points: Array, up: Array, near: Array | float) -> Blend:
     """The sheet with normals `up` (k, 3) near places (k, 3), of patches within a length (k,)."""
     pairs, near = charts.pairs(points, float(np.max(near, initial=0.0))), np.broadcast_to(near, len(points))
     alike = _facing(charts, pairs, up[pairs.point_index]) * _within(pairs.distance, near[pairs.point_index])
     return _weighted_mean(pairs, node_weights(charts, pairs) * alike, len(points))
+
+
+def distances_within_rims(charts: Charts, pairs: Pairs) -> Array:
+    """The distances (m,) of places from patches that end at their rims, or a little more."""
+    beyond = np.maximum(pairs.rho - 1.0, 0.0) * charts.radii[pairs.patch] * charts.widths[pairs.patch]
+    return np.hypot(pairs.distance, beyond)
+
+
+def nearest_sheet(charts: Charts, pairs: Pairs, count: int) -> Blend:
+    """The sheet of the nearest patch at each of `count` places, of pairs of places and patches."""
+    nearest = argmin_per_point(pairs.point_index, distances_within_rims(charts, pairs), count)
+    nearest = nearest[pairs.point_index]
+    up, radius = pairs.normal[nearest], charts.radii[pairs.patch[nearest]]
+    alike = facing_alike(charts, pairs, up, pairs.distance[nearest], radius)
+    return _weighted_mean(pairs, node_weights(charts, pairs) * alike, count)
 
 
 def covered(
@@ -242,6 +158,8 @@ def _weighted_mean(pairs: Pairs, w: Array, count: int) -> Blend:
     some = total(np.ones(len(w)))
     there = some > 0.0
     scale = 1.0 / np.where(there, some, 1.0)
+    rho = np.full(count, np.inf)
+    np.minimum.at(rho, place[w > 0.0], pairs.rho[w > 0.0])
     mean = scale * total(pairs.distance)
     spread = scale * total(np.square(pairs.distance - mean[place]))
     shares = np.bincount(place, np.square(w * scale[place]), count)
@@ -254,4 +172,5 @@ def _weighted_mean(pairs: Pairs, w: Array, count: int) -> Blend:
         np.where(there, np.sqrt(variance), np.inf),
         up,
         np.where(there, np.append(pairs.patch, -1)[best], -1),
+        rho,
     )

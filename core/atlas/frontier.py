@@ -21,13 +21,13 @@ from ..contours.finger import Contact
 from ..reconstruction.result import Reconstruction
 from ..triangles import normalized
 from .charts import AZIMUTHS, Charts
+from .connectivity import connected_pieces
 from .field import INSIDE, covered
 from .finger import DISK_PLACES, Finger
 from .join import stacked, tabulate
 from .meshing import Mesh
 from .reference_mesh import ReferenceMesh
 from .rims import radial_extent
-from .tetrahedra import connected_pieces
 
 # python -m benchmarks.atlas judges these.
 RIM = 24  # Each rim has this many places.

@@ -21,13 +21,13 @@ from ..reconstruction.start import TOUCH_ROUNDING, too_coarse
 from ..steps import chunked, part_of, result_of
 from ..triangles import row_dot
 from .charts import AZIMUTHS, Charts
+from .connectivity import connected_pieces
 from .finger import FACING
 from .frontier import RimPlace
 from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
 from .object_atlas import AT_ONCE, Atlas, joined_surface
 from .orientation import doubt_of, oriented, place_text, planes_of, sharpened
-from .tetrahedra import connected_pieces
 from .unfelt import uncovered_places
 
 # python -m benchmarks.robot judges these.

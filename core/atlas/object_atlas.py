@@ -20,9 +20,10 @@ from .borders import Border, snapped_to_border
 from .boundaries import Edge, edges_of, gaussian_curvature_of, node_dict
 from .charts import Charts
 from .curvature import NormalSamples, curvatures_of, sheets_of
+from .field import Blend, sheet_facing
 from .frontier import RimPlace
 from .indicator import Indicator
-from .meshing import MOST_BYTES, WALL, Felt, MeasuredContacts, Mesh, lattice_of, memory_of, meshed
+from .meshing import MOST_BYTES, WALL, Felt, MeasuredContacts, Mesh, memory_of, meshed
 from .reference_mesh import ReferenceMesh
 from .samples import indicated
 
@@ -376,7 +377,11 @@ class Atlas:
 
     @cached_property
     def _sheets(self) -> NormalSamples:
-        return sheets_of(self.reference.mesh)
+        mesh = self.reference.mesh
+        normals = mesh.normals
+        some = partial(sheet_facing, self.charts, near=self.reference.edge)
+        sheet = Blend._make(result_of(chunked(some, AT_ONCE, 1.0, mesh.vertices, normals)))
+        return sheets_of(mesh, np.where(sheet.patch[:, None] < 0, normals, sheet.normal))
 
     def meshing(self, edge: float) -> Generator[float, None, Mesh]:
         """Makes the `mesh` in steps: yields the share that is done, and returns the mesh.
@@ -389,8 +394,7 @@ class Atlas:
             raise ValueError(
                 f"edge: expected at most the size of what was felt, {indicator.size:.3g}, got {edge:.3g}"
             )
-        lattice, _ = lattice_of(indicator, edge)
-        memory = memory_of(*self.reference.mesh[:2], edge, lattice)
+        memory = memory_of(*self.reference.mesh[:2], edge)
         if memory > MOST_BYTES:
             raise ValueError(
                 f"edge: expected triangles that take {1e-9 * MOST_BYTES:g} GB of memory or less, got "

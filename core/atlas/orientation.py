@@ -15,8 +15,8 @@ import numpy as np
 from ..arguments import Array
 from ..steps import result_of
 from ..triangles import normalized, row_dot
+from .connectivity import Indices, connected_pieces
 from .indicator import solve_poisson
-from .tetrahedra import Indices, connected_pieces
 
 # python -m benchmarks.measured --orientation judges these.
 FEWEST, MOST, MORE = 8, 600, 1.5  # The numbers of a plane's neighbors, and their growth until it is certain:

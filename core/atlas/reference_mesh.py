@@ -14,10 +14,10 @@ from ..arguments import Array
 from ..contours.contour import Vector
 from ..triangles import LEAST_DIVISOR, normalized, row_dot, triangle_cross
 from .charts import Charts
-from .field import SurfaceSample, surface_within_margin
+from .connectivity import Indices
+from .field import Blend, sheet_facing
 from .indicator import Indicator
 from .meshing import Mesh
-from .tetrahedra import Indices
 
 # python -m benchmarks.atlas judges these.
 NEAREST = 3  # The nearest triangle is looked for at this many of the nearest vertices.
@@ -200,10 +200,10 @@ class ReferenceMesh:
 
         return cKDTree(self.mesh.vertices[self.is_open])
 
-    def _project(self, charts: Charts, places: Array, up: Array) -> tuple[SurfaceSample, Array]:
+    def _project(self, charts: Charts, places: Array, up: Array) -> tuple[Blend, Array]:
         """The surface near places (n, 3) that faces `up` (n, 3), and the places moved onto it."""
         for _ in range(2):  # What is farther from a place of the mesh is another part of the surface.
-            surface = surface_within_margin(charts, self.indicator, places, up, SAGITTA * self.edge)
+            surface = sheet_facing(charts, places, up, SAGITTA * self.edge)
             places = places - surface.distance[:, None] * surface.normal
         return surface, places
 

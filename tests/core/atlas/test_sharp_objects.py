@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 import core
-from core.atlas.creases import insert_creases
 from core.atlas.reference_mesh import ReferenceMesh, closest_point
 from core.atlas.touching import CHECKS, SHARPEST, rays_at
-from core.steps import result_of
 from tests import solids
 
 BLOCK = solids.block()
@@ -285,6 +283,3 @@ def test_where_walls_turn_smoothly_there_is_no_crease():
     assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1.0).max() < TOLERANCE
     a, b = mesh.vertices[mesh.triangles[:, :2]].transpose(1, 0, 2)
     assert np.einsum("ni,ni->n", a, b).min() < 0.8
-    vertices, *_ = result_of(insert_creases(atlas.charts, mesh.vertices, mesh.triangles, mesh.vertices, 0.6))
-    assert len(vertices) == len(mesh.vertices)
-    assert (vertices == mesh.vertices).all()

@@ -1,0 +1,245 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The surface of many patches as triangles: dual contouring (Ju et al. 2002) with the planes of patches.
+
+Not in the paper. Each cell of a lattice with corners inside and outside gets one vertex, at the place nearest
+to the planes of the patches along its edges: on walls, creases and at corners that is one rule. Each edge of
+the lattice between inside and outside gets a quadrilateral between the vertices of its four cells.
+"""
+
+from collections.abc import Generator
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..arguments import Array
+from ..steps import chunked
+from ..triangles import normalized, row_dot, triangle_cross
+from .charts import Charts
+from .connectivity import Indices
+from .field import Blend, distances_within_rims, nearest_sheet, sheet_facing
+from .indicator import Indicator
+from .lattice import Lattice, lattice_at_level, turned
+
+# python -m benchmarks.atlas --shapes judges these.
+BAND = 1.5  # Patches count within this many cells of the indicator, or pitches, of a point.
+CROSSED = 0.5  # A plane that passes an edge by so many pitches counts as well, if no other crosses it.
+SLACK = 1.0  # A vertex is at most this many pitches outside of its cell: the tip of a crease may be there.
+SOFT = 0.02  # A vertex does not move along planes that turn so little, as mean squares of their sines.
+SWEEPS = 12  # A vertex that is held near its cell is moved along each axis this often.
+LEVEL = 1e-6  # The weight of the indicator's level beside planes of patches.
+FACING = 0.95  # A sheet faces as the planes of a vertex do if the cosine between their normals is more.
+PLACES_AT_ONCE = 3000  # A step takes this many places.
+
+
+class Sides(NamedTuple):
+    """Sheets near the points of a lattice (n,).
+
+    points : (n,), in order
+    inside, outside : the nearest sheets; if these put them elsewhere, the nearest ones that put them there
+    side : (n,), -1 or 1 if patches put them inside or outside, and no patch near denies it; otherwise 0
+    """
+
+    points: Indices
+    inside: Blend
+    outside: Blend
+    side: Array
+
+
+class Surface(NamedTuple):
+    """Vertices (n, 3) and triangles (m, 3), counterclockwise from outside.
+
+    std, patch : (n,), the deviation of the surface, and the patch of most weight; inf and -1 where none is
+    rho, triangle_rho : (n,) and (m,), how far out they are on the patch where they are least so, or inf
+    """
+
+    vertices: Array
+    triangles: Indices
+    std: Array
+    patch: Indices
+    rho: Array
+    triangle_rho: Array
+
+
+def dual_contour(charts: Charts, indicator: Indicator, pitch: float) -> Generator[float, None, Surface]:
+    """The closed surface of patches, with edges about as long as the pitch; yields the share that is done."""
+    lattice, edges, sides = yield from _turned_at_creases(charts, indicator, pitch)
+    places, planes = _planes(lattice, sides, edges)
+    yield 0.7
+    lower, axis = np.divmod(edges, 3)
+    u, v = lattice.strides[(axis + 1) % 3], lattice.strides[(axis + 2) % 3]
+    quads = np.stack([lower, lower - u, lower - u - v, lower - v], axis=1)
+    outside = ~lattice.inside(lower)
+    quads[outside] = quads[outside, ::-1]
+    cells, index = np.unique(quads, return_inverse=True)
+    quads = index.reshape(-1, 4)
+    yield 0.7
+    vertices, up = _vertices(quads, places, planes, lattice.places(cells), pitch)
+    yield 0.8
+    own = _least_uncertain(quads, planes, len(cells))
+    steps = chunked(partial(_on_sheet, charts, pitch), PLACES_AT_ONCE, 0.9, vertices, up, *own)
+    vertices, *fields = yield from steps
+    sheet = Blend(*fields)
+    triangles = _cut(vertices, quads, planes.normal)
+    return Surface(vertices, triangles, sheet.std, sheet.patch, sheet.rho, np.tile(planes.rho, 2))
+
+
+def _turned_at_creases(
+    charts: Charts, indicator: Indicator, pitch: float
+) -> Generator[float, None, tuple[Lattice, Indices, Sides]]:
+    """A lattice, its edges (n,) whose ends are on different sides, and the Sides of these ends.
+
+    The level of the indicator is up to a cell inside of a convex crease, and outside of a concave one. Points
+    that are that near to the level, and that patches put on their other side, are turned layer by layer.
+    """
+    lattice, edges = yield from lattice_at_level(indicator, pitch)
+    layers, band = int(np.ceil(indicator.cell / pitch)) + 1, BAND * max(indicator.cell, pitch)
+    some = partial(_sides, charts, indicator.cell, band)
+    points = np.unique(lattice.ends(edges))
+    fields = yield from chunked(some, PLACES_AT_ONCE, 0.6, lattice.places(points))
+    for _ in range(layers):
+        side = fields[-1]
+        wrong = points[(side != 0.0) & ((side < 0.0) != lattice.inside(points))]
+        lattice, done = turned(lattice, wrong)
+        edges = lattice.crossed(np.union1d(edges, lattice.edges_around(done)))
+        new = np.setdiff1d(lattice.ends(edges), points)
+        parts = yield from chunked(some, PLACES_AT_ONCE, 0.6, lattice.places(new))
+        points = np.append(points, new)
+        order = np.argsort(points, kind="stable")
+        points = points[order]
+        fields = tuple(np.concatenate(both)[order] for both in zip(fields, parts, strict=True))
+    half = len(Blend._fields)
+    return lattice, edges, Sides(points, Blend(*fields[:half]), Blend(*fields[half:-1]), fields[-1])
+
+
+def _sides(charts: Charts, cell: float, band: float, places: Array) -> tuple[Any, ...]:
+    """The fields of the Sides of places (n, 3), by the patches within a length of these.
+
+    cell : only places that are nearer to a patch have a side
+    """
+    pairs, count = charts.pairs(places, band), len(places)
+    every, side, found = nearest_sheet(charts, pairs, count), np.zeros(count), []
+    for way in (-1.0, 1.0):
+        sheet = nearest_sheet(charts, pairs.chosen(np.sign(pairs.distance) == way), count)
+        side += np.where(sheet.patch < 0, 0.0, way)
+        found += [*sheet.where((sheet.patch >= 0) & (every.distance * way <= 0.0), every)]
+    away = np.full(count, np.inf)
+    np.minimum.at(away, pairs.point_index, distances_within_rims(charts, pairs))
+    return *found, np.where(away < cell, side, 0.0)
+
+
+def _planes(lattice: Lattice, sides: Sides, edges: Indices) -> tuple[Array, Blend]:
+    """Places (n, 3) where the surface crosses edges (n,), and the sheets there.
+
+    The plane is that of the outer end if it crosses the edge, and otherwise that of the inner end. Where
+    neither does, it is the level of the indicator, which has no patch.
+    """
+    one, other = lattice.ends(edges)
+    is_inside = lattice.inside(one)
+    inner, outer = np.where(is_inside, one, other), np.where(is_inside, other, one)
+    a = sides.inside.at(np.searchsorted(sides.points, inner))
+    b = sides.outside.at(np.searchsorted(sides.points, outer))
+    origin = lattice.places(inner)
+    way = lattice.places(outer) - origin
+    from_a, missed_a = _crossing(a, a.distance, a.distance + row_dot(a.normal, way))
+    from_b, missed_b = _crossing(b, b.distance - row_dot(b.normal, way), b.distance)
+    found = a.where(missed_a < missed_b, b)
+    shares, missed = np.where(missed_a < missed_b, from_a, from_b), np.minimum(missed_a, missed_b)
+    at_inner, at_outer = (lattice.indicator.at(places) for places in (origin, origin + way))
+    level = np.clip(at_inner / np.where(at_inner > at_outer, at_inner - at_outer, 1.0), 0.0, 1.0)
+    is_felt = missed < CROSSED
+    places = origin + np.where(is_felt, shares, level)[:, None] * way
+    nothing = np.full(len(edges), np.inf)
+    unfelt = Blend(level, nothing, lattice.indicator.outward(places), np.full(len(edges), -1), nothing)
+    return places, found.where(is_felt, unfelt)
+
+
+def _crossing(sheet: Blend, inner: Array, outer: Array) -> tuple[Array, Array]:
+    """Where planes cross edges (n,), as a share of these, and by how much they miss them; inf for no patch.
+
+    inner, outer : (n,), the distances of both ends from the planes
+    """
+    is_crossed = (sheet.patch >= 0) & (outer > inner)
+    shares = -inner / np.where(is_crossed, outer - inner, 1.0)
+    return shares, np.where(is_crossed, np.maximum(np.abs(shares - 0.5) - 0.5, 0.0), np.inf)
+
+
+def _least_uncertain(quads: Indices, planes: Blend, count: int) -> Blend:
+    """Of the planes (n,) around each of `count` cells, the sheets of least deviation.
+
+    quads : (n, 4), the cells around each plane
+    """
+    order = np.argsort(-planes.std, kind="stable")
+    best = np.zeros(count, dtype=np.intp)
+    best[quads[order]] = order[:, None]
+    return planes.at(best)
+
+
+def _vertices(
+    quads: Indices, places: Array, planes: Blend, corners: Array, pitch: float
+) -> tuple[Array, Array]:
+    """The vertices (m, 3) of cells whose lowest corners are given, (m, 3), and mean normals (m, 3) there.
+
+    They minimize the squares of distances to planes, from the mean of the places where these cross edges.
+
+    quads : (n, 4), the cells around planes (n,) through places (n, 3)
+    """
+    count, normals, cells = len(corners), planes.normal, quads.ravel()
+    weights = np.repeat(np.where(planes.patch < 0, LEVEL, 1.0), 4)
+    total = np.bincount(cells, weights, count)
+
+    def mean(values: Array) -> Array:
+        """Means (m, k) of values (n, k) over the planes around each cell."""
+        sums = [np.bincount(cells, weights * np.repeat(column, 4), count) for column in values.T]
+        return np.stack(sums, axis=1) / total[:, None]
+
+    middle, up = mean(places), mean(normals)
+    square = mean((normals[:, :, None] * normals[:, None]).reshape(-1, 9)).reshape(-1, 3, 3)
+    right = mean(row_dot(normals, places)[:, None] * normals) - np.einsum("mij,mj->mi", square, middle)
+    # The step s minimizes |square s - right|^2 + SOFT^2 |s|^2.
+    right = np.einsum("mij,mj->mi", square, right)
+    square = square @ square + SOFT**2 * np.eye(3)
+    step = np.linalg.solve(square, right[..., None])[..., 0]
+    low, high = corners - SLACK * pitch - middle, corners + (1.0 + SLACK) * pitch - middle
+    out = np.flatnonzero(((step < low) | (step > high)).any(axis=1))
+    step[out] = _held(square[out], right[out], low[out], high[out])
+    return middle + step, up
+
+
+def _held(square: Array, right: Array, low: Array, high: Array) -> Array:
+    """The x (m, 3) from `low` to `high` that minimize x' square x / 2 - right' x, by coordinate descent."""
+    x = np.clip(0.0 * right, low, high)
+    for _ in range(SWEEPS):
+        for i in range(3):
+            move = (right[:, i] - row_dot(square[:, i], x)) / square[:, i, i]
+            x[:, i] = np.clip(x[:, i] + move, low[:, i], high[:, i])
+    return x
+
+
+def _on_sheet(charts: Charts, reach: float, vertices: Array, up: Array, *own: Any) -> tuple[Any, ...]:
+    """Vertices (n, 3) moved onto the sheets that face as they do, and the fields of these.
+
+    On a crease no sheet does: there vertices stay, and have the fields of their planes.
+
+    reach : a sheet is within this length
+    up : (n, 3), mean normals of planes
+    """
+    up = normalized(up)
+    sheet = sheet_facing(charts, vertices, up, 2.0 * reach)
+    is_facing = (row_dot(sheet.normal, up) > FACING) & (np.abs(sheet.distance) < reach)
+    moved = vertices - np.where(is_facing, sheet.distance, 0.0)[:, None] * sheet.normal
+    return moved, *sheet.where(is_facing, Blend(*own))
+
+
+def _cut(vertices: Array, quads: Indices, normals: Array) -> Indices:
+    """Quadrilaterals (n, 4) cut along the diagonal whose triangles (2 n, 3) face as normals (n, 3) do."""
+
+    def facing(some: Indices) -> Array:
+        """The least cosine (n,) between the two triangles of quadrilaterals and their normals."""
+        halves = (triangle_cross(vertices[some[:, each]]) for each in ([0, 1, 2], [0, 2, 3]))
+        return np.min([row_dot(normalized(half), normals) for half in halves], axis=0)
+
+    other = np.roll(quads, -1, axis=1)
+    quads = np.where((facing(quads) >= facing(other))[:, None], quads, other)
+    return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])

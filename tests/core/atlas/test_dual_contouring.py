@@ -1,0 +1,168 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The lattice and its topology, vertices where planes meet, and triangles whose edges are split."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import label
+
+import core
+from core.atlas.connectivity import split_sides
+from core.atlas.dual_contouring import _held, dual_contour
+from core.atlas.indicator import Indicator
+from core.atlas.join import charts_of
+from core.atlas.lattice import CORNERS, Lattice, _cases, composed, lattice_at_level, turned
+from core.steps import result_of
+from tests import solids
+
+BLOCK = solids.block()
+
+
+def indicator_of(values, cell=0.1):
+    return Indicator(np.array(values, dtype=np.float32), np.zeros(3), cell, 1.0, np.inf)
+
+
+def ball_indicator(count=24):
+    """The values fall from inside to outside of a ball around the middle of the grid."""
+    index = np.moveaxis(np.indices((count,) * 3), 0, -1) - 0.5 * (count - 1)
+    return indicator_of(0.35 * count - np.linalg.norm(index, axis=-1))
+
+
+@pytest.fixture(scope="module")
+def far():
+    """The table of a patch that is far from all lattices here."""
+    point = np.array([1e3, 0.0, 0.0])
+    solid = solids.ball().placed(1.0, point)
+    return charts_of([core.explore(solid, solid.start, solid.outward, rng=0).result])
+
+
+def surface(charts, indicator, pitch):
+    return result_of(dual_contour(charts, indicator, pitch))
+
+
+@pytest.mark.parametrize("pitch", [0.013, 0.1, 0.17, 0.3])
+def test_without_patches_the_level_of_the_indicator_is_closed_at_any_pitch(far, pitch):
+    indicator = ball_indicator()
+    found = surface(far, indicator, pitch)
+    assert solids.topology(found.triangles) == solids.Topology(0, 0, 2, 1)
+    assert (found.patch == -1).all() and np.isinf(found.rho).all()
+    out = np.linalg.norm(found.vertices - 0.05 * 23, axis=1)
+    assert np.abs(out - 0.1 * 0.35 * 24).max() < 0.7 * pitch + 0.02
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_any_signs_make_a_closed_manifold(far, seed):
+    values = np.full((14, 14, 14), -1.0)
+    values[2:-2, 2:-2, 2:-2] = np.random.default_rng(seed).choice([-1.0, 1.0], (10, 10, 10))
+    shape = solids.topology(surface(far, indicator_of(values), 0.1).triangles)
+    assert (shape.open, shape.tangled) == (0, 0)
+
+
+def test_two_opposite_corners_are_not_composed_and_one_turned_corner_is_enough_where_it_can_be():
+    good, corner = _cases()
+    for code in range(256):
+        inside = (code >> np.arange(8) & 1).astype(bool)
+        for one in np.flatnonzero(inside):
+            for other in np.flatnonzero(inside):
+                apart = np.abs(CORNERS[one] - CORNERS[other])
+                if apart.sum() == 2:  # They are opposite on a face, whose other corners decide.
+                    beside = [
+                        c
+                        for c in range(8)
+                        if (np.abs(CORNERS[c] - CORNERS[[one, other]]).sum(axis=1) == 1).all()
+                    ]
+                    assert not good[code] or inside[beside].any()
+    assert good[[0, 1, 3, 255]].all() and not good[[0b1001, 0b10000001]].any()
+    assert not (np.flatnonzero(~good) >> corner[~good] & 1).any()
+
+
+def test_turned_points_leave_the_topology():
+    lattice, edges = result_of(lattice_at_level(ball_indicator(), 0.1))
+    points = np.unique(lattice.ends(edges))
+    inside = points[lattice.inside(points)]
+    asked = np.random.default_rng(0).permutation(inside)[: len(inside) // 2]
+    found, done = turned(lattice, asked)
+    assert 0.3 * len(asked) < len(done) <= len(asked)
+    assert not found.inside(done).any()
+    assert _cases()[0][found.codes(found.cells_around(points))].all()
+    is_inside = found.inside(np.arange(np.prod(lattice.shape))).reshape(lattice.shape)
+    assert label(is_inside)[1] == label(~is_inside)[1] == 1
+
+
+def test_a_single_point_and_a_bridge_are_not_turned():
+    values = np.full((9, 9, 9), -1.0)
+    values[2:7, 4, 4] = 1.0
+    lattice, _ = result_of(lattice_at_level(indicator_of(values), 0.1))
+    middle = np.ravel_multi_index((5, 5, 5), lattice.shape)  # The lattice has a layer more on each side.
+    assert lattice.inside(np.array([middle])).all()
+    assert len(turned(lattice, np.array([middle]))[1]) == 0
+    end = np.ravel_multi_index((3, 5, 5), lattice.shape)
+    assert turned(lattice, np.array([end]))[1].tolist() == [end]
+
+
+def test_a_lattice_that_is_composed_stays():
+    lattice, edges = result_of(lattice_at_level(ball_indicator(), 0.1))
+    assert isinstance(lattice, Lattice)
+    again = composed(lattice, lattice.cells_around(np.unique(lattice.ends(edges))))
+    assert np.array_equal(again.turned, lattice.turned)
+
+
+def test_what_is_held_in_a_box_is_the_least_there():
+    rng = np.random.default_rng(0)
+    factors, right = rng.normal(size=(50, 3, 3)), rng.normal(size=(50, 3))
+    square = factors @ np.swapaxes(factors, 1, 2) + 0.3 * np.eye(3)
+    low, high = np.full((50, 3), -0.2), np.full((50, 3), 0.3)
+    x = _held(square, right, low, high)
+
+    def value(at):
+        return 0.5 * np.einsum("ni,nij,nj->n", at, square, at) - np.einsum("ni,ni->n", right, at)
+
+    assert (x >= low).all() and (x <= high).all()
+    for _ in range(300):
+        assert (value(x) <= value(rng.uniform(low, high)) + 1e-3).all()
+
+
+@pytest.fixture(scope="module")
+def block():
+    options = {"tolerance": 8e-3, "noise": 1e-3, "rng": 0}
+    return core.explore_object(BLOCK, BLOCK.start, BLOCK.outward, **options)
+
+
+@pytest.mark.parametrize("edge", [0.1, 0.05, 0.02])
+def test_no_edge_is_a_needle_and_creases_are_as_near_as_walls(block, edge):
+    mesh = block.mesh(edge)
+    ends = mesh.vertices[mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)]
+    lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
+    assert lengths.max() < 3.0 * np.median(lengths)
+    assert np.abs(BLOCK.distances(mesh.vertices)).max() < 8e-3
+    off = np.linalg.norm(BLOCK.edges(50)[:, None] - mesh.vertices, axis=2).min(axis=1)
+    assert np.quantile(off, 0.95) < 0.6 * edge
+
+
+def test_points_beside_a_crease_are_inside_though_the_indicator_has_them_outside(block):
+    """The indicator is negative along the creases of a block, which are on the mesh all the same."""
+    points = BLOCK.edges(50)
+    assert (block.reference.indicator.at(points) < 0.0).mean() > 0.9
+    distance, std = block.distance(points)
+    assert np.quantile(np.abs(distance), 0.95) < 0.25 * 8e-3
+    assert np.isfinite(std).all()
+
+
+def octahedron():
+    vertices = np.vstack([np.eye(3), -np.eye(3)])
+    triangles = [(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)]
+    return vertices, np.array(triangles)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 1.0])
+def test_split_sides_leave_the_same_surface_without_a_gap(share):
+    """Cases of one, two and three split sides of a triangle occur, and each vertex is on its side."""
+    vertices, triangles = octahedron()
+    sides = np.unique(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    sides = sides[np.random.default_rng(0).random(len(sides)) < share]
+    found = split_sides(triangles, sides, len(vertices))
+    more = np.vstack([vertices, vertices[sides].mean(axis=1)])
+    assert solids.topology(found) == solids.Topology(0, 0, 2, 1)
+    assert len(found) == len(triangles) + 2 * len(sides)
+    a, b, c = more[found].transpose(1, 0, 2)
+    assert np.einsum("ni,ni->", np.cross(a, b), c) / 6.0 == pytest.approx(4.0 / 3.0)
