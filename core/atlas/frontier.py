@@ -19,7 +19,7 @@ from ..arguments import Array
 from ..contours.contour import Contour, Vector, cross, dot, tangent_of, vector_of
 from ..contours.finger import Contact
 from ..reconstruction.result import Reconstruction
-from ..triangles import normalized
+from ..triangles import normalized, triangle_cross
 from .charts import AZIMUTHS, Charts
 from .connectivity import connected_pieces
 from .field import INSIDE, covered
@@ -188,26 +188,26 @@ class Frontier:
         return found
 
     def unfelt(self, mesh: Mesh) -> Generator[float, None, list[tuple[RimPlace, Contact]]]:
-        """Places of pieces of a closed surface where nothing was felt, each with a contact near its middle.
+        """Places of pieces of a closed surface where nothing was felt, each with a contact there.
 
-        Pieces near which the finger meets nothing are no surface. Yields 1 after each.
+        In a piece they are as far apart as the sides of a square of its area. Pieces near which the finger
+        meets nothing are no surface. Yields 1 after each.
         """
-        found, sides = [], mesh.triangles
+        found, sides, normals = [], mesh.triangles, mesh.normals
         count, piece = connected_pieces(sides[:, :2].ravel(), sides[:, 1:].ravel(), len(mesh.vertices))
-        normals = mesh.normals
-        for one in range(count):
+        areas = 0.5 * np.linalg.norm(triangle_cross(mesh.vertices[sides]), axis=1)
+        for one, side in enumerate(np.sqrt(np.bincount(piece[sides[:, 0]], areas, count)).tolist()):
             yield 1.0
-            some = np.flatnonzero(piece == one)
-            away = np.linalg.norm(mesh.vertices[some] - mesh.vertices[some].mean(axis=0), axis=1)
-            places = (
-                (vector_of(mesh.vertices[i]), vector_of(normals[i]))
-                for i in some[np.argsort(away, kind="stable")]
-            )
-            for p, n in places:
-                if (contact := self.finger.near(p, n, self.near)) is not None:
-                    ahead = tangent_of(contact[1], None)
-                    found.append((RimPlace(*contact, ahead, float(away.max())), contact))
-                    break
+            left = np.flatnonzero(piece == one)
+            away = np.linalg.norm(mesh.vertices[left] - mesh.vertices[left].mean(axis=0), axis=1)
+            left = left[np.argsort(away, kind="stable")]
+            while len(left):
+                point, normal = (vector_of(values[left[0]]) for values in (mesh.vertices, normals))
+                apart = 0.0
+                if (contact := self.finger.near(point, normal, self.near)) is not None:
+                    found.append((RimPlace(*contact, tangent_of(contact[1], None), side), contact))
+                    apart = side
+                left = left[1:][np.linalg.norm(mesh.vertices[left[1:]] - point, axis=1) > apart]
         return found
 
     def _forget_covered(self) -> Generator[None, None, None]:

@@ -163,9 +163,10 @@ def meshed(
     is_unfelt = yield from _unfelt(surface, middles, np.isinf(off), ended, span)
     std = np.where(surface.patch < 0, indicator.cell, surface.std)
     if ended is None:
+        # What is bridged may be anywhere within the span.
         between = np.zeros(len(std))
-        np.maximum.at(between, surface.triangles.ravel(), np.minimum(off, span).repeat(3))
-        std = np.maximum(std, between)
+        np.maximum.at(between, surface.triangles.ravel(), np.minimum(off, span / np.sqrt(3.0)).repeat(3))
+        std = np.maximum(np.where(surface.patch < 0, 0.0, std), between)
     mesh = Mesh(surface.vertices, surface.triangles, std, surface.patch)
     return mesh.chosen(~is_unfelt), mesh.chosen(is_unfelt)
 
