@@ -169,7 +169,8 @@ def _trim_unfelt(
     if ended is None:
         # A hole is as large with any length of edges; along creases there are many that are tiny.
         is_hole = np.isinf(rho[beyond]).all(axis=1)
-        holes, some = connected_pieces(*beyond[is_hole][:, [0, 1, 1, 2]].reshape(-1, 2).T, len(vertices))
+        sides, _ = keyed_sides(beyond[is_hole], len(vertices))
+        holes, some = connected_pieces(sides[:, 0], sides[:, 1], len(vertices))
         areas = 0.5 * np.linalg.norm(triangle_cross(vertices[beyond[is_hole]]), axis=1)
         hole = some[beyond[is_hole, 0]]
         is_large = np.bincount(hole, areas, holes)[hole] > BRIDGED * indicator.cell**2
