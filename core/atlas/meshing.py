@@ -196,8 +196,8 @@ def _unfelt(
     if ended is None:
         # A hole is as large with any length of edges; along creases there are many that are tiny.
         is_hole = np.isinf(rho[beyond]).all(axis=1)
-        ends = beyond[is_hole][:, [0, 1, 1, 2]].reshape(-1, 2)
-        holes, some = connected_pieces(ends[:, 0], ends[:, 1], len(vertices))
+        sides, _ = keyed_sides(beyond[is_hole], len(vertices))
+        holes, some = connected_pieces(sides[:, 0], sides[:, 1], len(vertices))
         areas = 0.5 * np.linalg.norm(triangle_cross(vertices[beyond[is_hole]]), axis=1)
         hole = some[beyond[is_hole, 0]]
         is_large = np.bincount(hole, areas, holes)[hole] > BRIDGED * span**2
