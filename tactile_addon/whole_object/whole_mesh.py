@@ -104,13 +104,13 @@ def _disk(r: core.Reconstruction, rim: Array) -> tuple[Array, Array, Array, Arra
 
 
 def _below(surface: DetachedMesh, points: Array, normals: Array) -> Array:
-    """How far a mesh is above the points of a disk, (n,), and the middles between these along spokes."""
-    inner = np.maximum(np.arange(1, len(points)) - SPOKES, 0)
-    places = np.vstack([points, 0.5 * (points[1:] + points[inner])])
-    heights = np.sum((surface.feet(places) - places) * np.vstack([normals, normals[1:]]), axis=1)
+    """How far a mesh is above the points of a disk, (n,), or above the middles of triangles around these."""
+    fan = _fan()
+    places = np.vstack([points, points[fan].mean(axis=1)])
+    ways = np.vstack([normals, normals[fan].mean(axis=1)])
+    heights = np.sum((surface.feet(places) - places) * ways, axis=1)
     below, between = np.split(np.maximum(heights, 0.0), [len(points)])
-    below[1:] = np.maximum(below[1:], between)
-    np.maximum.at(below, inner, between)
+    np.maximum.at(below, fan, between[:, None])
     return below
 
 

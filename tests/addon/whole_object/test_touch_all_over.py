@@ -105,7 +105,7 @@ def test_near_the_edges_of_a_cube_curvatures_are_unknown_and_colors_those_of_the
         ({"edge": 5.0}, "The edge length 5 m is larger than 2 m"),
         (
             {"edge": 1e-3},
-            'The edge length 1 mm is smaller than 4.75 mm, for which the surface of "Sphere" takes 2 GB',
+            'The edge length 1 mm is smaller than 5.71 mm, for which the surface of "Sphere" takes 2 GB',
         ),
         (
             {"tolerance": 1e-9},

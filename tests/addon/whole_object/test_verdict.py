@@ -87,7 +87,7 @@ def test_growing_patches_are_above_the_mesh_and_each_other(empty, extension, tou
     faces = [np.argmax(r.frame.axes[:, 2] @ np.vstack([np.eye(3), -np.eye(3)]).T) for r in touches.found]
     above = np.abs(points[:, 0]).max(axis=1) - 1.0
     growing.remove()
-    assert 1e-3 < above.min() < above.max() < 5e-3  # The cube's size is 2.
+    assert 2e-4 < above.min() < above.max() < 5e-3  # The cube's size is 2; narrow patches are nearer to it.
     assert shown > len(set(faces))
     for face in set(faces):
         heights = np.sort(above[np.array(faces) == face])
