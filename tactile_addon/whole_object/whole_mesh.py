@@ -23,7 +23,7 @@ from .whole_surface import WholeSurface
 
 SHARP = math.radians(30.0)  # Edges at which faces are turned by more are creases.
 # While a patch is one of many, it is drawn with these rings, the last of which is its dark rim, and spokes.
-RINGS, SPOKES = (0.3, 0.65, 0.95, 1.0), 48
+RINGS, SPOKES = (0.25, 0.5, 0.75, 0.95, 1.0), 48
 RIM_COLOR = (0.02, 0.02, 0.02, 1.0)
 # It is drawn no lower than the mesh, above that by this share of the object's size, or of its own if that is
 # less, and above patches that it overlaps by as much, up to so many times.
@@ -48,7 +48,7 @@ class GrowingPatches:
         obj.data.materials.append(emission("Tactile Surface", attribute=COLOR))
         self._patches: list[tuple[Array, Array, Array, Array]] = []
         self._uid, self._size, self._surface = obj.session_uid, surface.size, surface
-        self._placed = np.zeros((0, 8))  # The origin, normal, reach and layer of each patch.
+        self._placed = np.zeros((0, 8))  # The origin, normal, reach and height of each patch.
         show_colors()
         show_size(surface.size)
 
@@ -60,7 +60,7 @@ class GrowingPatches:
         for r, rim in zip(found, rims, strict=True):
             points, normals, k, curvedness = _disk(r, rim)
             layer = min(LAYER * self._size, OWN_LAYER * float(np.median(rim)))
-            above = _below(self._surface, points, normals) + layer * (1 + self._layer(r.frame, rim.max()))
+            above = _below(self._surface, points, normals) + self._height(r.frame, rim.max(), layer)
             areas = np.full(len(k), np.mean(rim**2))
             self._patches.append((points + above[:, None] * normals, k, curvedness, areas))
         points, k, curvedness, areas = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
@@ -71,14 +71,16 @@ class GrowingPatches:
         shades.reshape(-1, count, 4)[:, -SPOKES:] = RIM_COLOR
         fill(obj.data, points, triangles, [(COLOR, shades)])
 
-    def _layer(self, frame: core.Frame, reach: float) -> int:
-        """The lowest free layer for a patch with this frame and reach, as overlapping ones in one flicker."""
+    def _height(self, frame: core.Frame, reach: float, layer: float) -> float:
+        """The lowest free multiple of a length for a patch, as overlapping ones at one height flicker."""
         normal, (others, ups) = frame.axes[:, 2], np.hsplit(self._placed[:, :6], 2)
         near = np.linalg.norm(others - frame.origin, axis=1) < self._placed[:, 6] + reach
         taken = self._placed[near & (ups @ normal > ALIKE), 7]
-        layer = next((number for number in range(LAYERS) if number not in taken), len(taken) % LAYERS)
-        self._placed = np.vstack([self._placed, [*frame.origin, *normal, reach, layer]])
-        return layer
+        heights = layer * np.arange(1, LAYERS + 1)
+        is_free = np.abs(heights[:, None] - taken).min(axis=1, initial=np.inf) > 0.4 * layer
+        height = float(heights[np.argmax(is_free) if is_free.any() else len(taken) % LAYERS])
+        self._placed = np.vstack([self._placed, [*frame.origin, *normal, reach, height]])
+        return height
 
     def remove(self) -> None:
         """Deletes the object, if it is still there."""
