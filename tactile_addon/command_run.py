@@ -238,9 +238,8 @@ def _default_target(file: Path | None) -> str:
     """The name of the scene's only mesh, if nothing else is active. Raises OSError if there are several."""
     if bpy.context.view_layer.objects.active is not None:
         return ""
-    meshes = sorted(
-        (obj for obj in bpy.context.scene.objects if obj.type == "MESH"), key=lambda obj: obj.name
-    )
+    objects: list[Object] = list(bpy.context.scene.objects)
+    meshes = sorted((obj for obj in objects if obj.type == "MESH"), key=lambda obj: str(obj.name))
     meshes = [obj for obj in meshes if len(obj.data.polygons)] or meshes
     return mesh_file.named(file or Path(bpy.data.filepath or "scene"), meshes, "").name if meshes else ""
 

@@ -238,7 +238,9 @@ def _cut(vertices: Array, quads: Indices, normals: Array) -> Indices:
     def facing(some: Indices) -> Array:
         """The least cosine (n,) between the two triangles of quadrilaterals and their normals."""
         halves = (triangle_cross(vertices[some[:, each]]) for each in ([0, 1, 2], [0, 2, 3]))
-        return np.min([row_dot(normalized(half), normals) for half in halves], axis=0)
+        one, other = (row_dot(normalized(half), normals) for half in halves)
+        least: Array = np.minimum(one, other)
+        return least
 
     other = np.roll(quads, -1, axis=1)
     quads = np.where((facing(quads) >= facing(other))[:, None], quads, other)

@@ -190,24 +190,25 @@ class Frontier:
     def unfelt(self, mesh: Mesh) -> Generator[float, None, list[tuple[RimPlace, Contact]]]:
         """Places of pieces of a closed surface where nothing was felt, each with a contact there.
 
-        In a piece they are as far apart as the sides of a square of its area. Pieces near which the finger
-        meets nothing are no surface. Yields 1 after each.
+        In a piece they are as far apart as the sides of a square of its area. Pieces on most of which the
+        finger meets nothing are no surface, as beyond a border. Yields 1 after each.
         """
         found, sides, normals = [], mesh.triangles, mesh.normals
         count, piece = connected_pieces(sides[:, :2].ravel(), sides[:, 1:].ravel(), len(mesh.vertices))
         areas = 0.5 * np.linalg.norm(triangle_cross(mesh.vertices[sides]), axis=1)
         for one, side in enumerate(np.sqrt(np.bincount(piece[sides[:, 0]], areas, count)).tolist()):
             yield 1.0
-            left = np.flatnonzero(piece == one)
-            away = np.linalg.norm(mesh.vertices[left] - mesh.vertices[left].mean(axis=0), axis=1)
-            left = left[np.argsort(away, kind="stable")]
-            while len(left):
-                point, normal = (vector_of(values[left[0]]) for values in (mesh.vertices, normals))
-                apart = 0.0
-                if (contact := self.finger.near(point, normal, self.near)) is not None:
-                    found.append((RimPlace(*contact, tangent_of(contact[1], None), side), contact))
-                    apart = side
-                left = left[1:][np.linalg.norm(mesh.vertices[left[1:]] - point, axis=1) > apart]
+            some = np.flatnonzero(piece == one)
+            away = np.linalg.norm(mesh.vertices[some] - mesh.vertices[some].mean(axis=0), axis=1)
+            some = some[np.argsort(away, kind="stable")]
+            some = some[np.unique(np.linspace(0, len(some) - 1, DISK_PLACES).astype(np.intp))]
+            places = ((vector_of(mesh.vertices[i]), vector_of(normals[i])) for i in some)
+            contacts = [contact for p, n in places if (contact := self.finger.near(p, n, self.near))]
+            chosen: list[Contact] = []
+            for contact in contacts if 2 * len(contacts) > len(some) else ():
+                if all(math.dist(contact[0], other[0]) > side for other in chosen):
+                    chosen.append(contact)
+            found += [(RimPlace(*c, tangent_of(c[1], None), side), c) for c in chosen]
         return found
 
     def _forget_covered(self) -> Generator[None, None, None]:

@@ -63,7 +63,8 @@ class Lattice(NamedTuple):
 
     def codes(self, cells: Indices) -> Indices:
         """The corners of cells (n,) that are inside, as bits, (n,). A cell is its lowest corner."""
-        corners, index = np.unique(cells[:, None] + CORNERS @ self.strides, return_inverse=True)
+        every: Indices = cells[:, None] + CORNERS @ self.strides
+        corners, index = np.unique(every, return_inverse=True)
         return self.inside(corners)[index.reshape(-1, 8)] @ (1 << np.arange(8))
 
     def cells_around(self, points: Indices) -> Indices:
@@ -137,7 +138,8 @@ def composed(lattice: Lattice, cells: Indices) -> Lattice:
     while len(cells):
         codes = lattice.codes(cells)
         bad = ~is_composed[codes]
-        points = np.unique(cells[bad] + CORNERS[corner[codes[bad]]] @ lattice.strides)
+        corners: Indices = cells[bad] + CORNERS[corner[codes[bad]]] @ lattice.strides
+        points = np.unique(corners)
         lattice, cells = lattice.turn(points), lattice.cells_around(points)
     return lattice
 

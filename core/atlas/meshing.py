@@ -163,7 +163,8 @@ def meshed(
     is_unfelt = yield from _unfelt(surface, middles, np.isinf(off), ended, span)
     std = np.where(surface.patch < 0, indicator.cell, surface.std)
     if ended is None:
-        # What is bridged may be anywhere within the span.
+        # Where no patch is, what is bridged may be anywhere within the span.
+        off[np.isinf(off) & np.isfinite(surface.triangle_rho)] = 0.0
         between = np.zeros(len(std))
         np.maximum.at(between, surface.triangles.ravel(), np.minimum(off, span / np.sqrt(3.0)).repeat(3))
         std = np.maximum(np.where(surface.patch < 0, 0.0, std), between)

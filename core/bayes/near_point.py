@@ -29,12 +29,13 @@ def curvature_contradiction(contacts: Array, posterior: SurfacePosterior, covari
     basis = monomials(near, QUARTIC)[:, 1:]
     u, singular, v = np.linalg.svd(basis, full_matrices=False)
     shown = singular > INVISIBLE * singular[:1]
-    if len(near) < ENOUGH * max(np.count_nonzero(shown), 1):
+    rank = int(shown.sum())
+    if not rank or len(near) < ENOUGH * rank:
         return 0.0
     inverse = v[shown].T / singular[shown]
     quartic = inverse @ (u[:, shown].T @ near[:, 2])
     left = near[:, 2] - basis @ quartic
-    variance = float(left @ left) / (len(near) - np.count_nonzero(shown))
+    variance = float(left @ left) / (len(near) - rank)
     rows = inverse[2:FREE]
     off = quartic[2:FREE] - posterior.polynomial[2:FREE]
     directions = bent()

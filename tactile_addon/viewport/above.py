@@ -7,8 +7,9 @@ normals or toward the viewer. Material Preview and Rendered move them by their m
 an export has.
 """
 
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, cast
 
 import bpy
 import gpu
@@ -19,10 +20,7 @@ from ..scene.patch_record import ATLAS_RECORD, MAP_RECORD, parts_of, report_of
 from ..touch.arrays import read_array
 from ..touch.types import Array, Object
 
-DARKEST, BRIGHTEST = (
-    0.3,
-    0.7,
-)  # Shares of the color that faces have edge on and upright, as Solid shading has.
+DARKEST, BRIGHTEST = 0.3, 0.7  # The share of its color that a face has edge on, and upright, as in Solid.
 TOWARD = 0.015  # A patch is drawn nearer by this share of its distance than what is below it.
 ALIKE = 0.1  # Patches overlap only if the cosine between their normals is more.
 CONTOUR_COLOR = np.array([[0.0, 0.0, 0.0, 1.0]], dtype=np.float32)
@@ -49,7 +47,8 @@ def draw_above() -> None:
     space: Any = context.space_data
     if space.shading.type != "SOLID" or space.shading.color_type != "VERTEX" or context.mode != "OBJECT":
         return
-    visible = {obj for obj in context.visible_objects if obj.type == "MESH" and len(obj.data.polygons)}
+    objects: Sequence[Object] = list(context.visible_objects)
+    visible = {obj for obj in objects if obj.type == "MESH" and len(obj.data.polygons)}
     in_mesh = [obj for obj in visible if _is_of_object(obj) and not obj.show_in_front]
     layers = {
         part: layer
@@ -93,8 +92,8 @@ def _layers(objects: list[Object]) -> dict[Object, int]:
 
 def _draw(obj: Object, height: float, layer: int) -> None:
     """Draws an object this far along its normals, and by so many layers toward the viewer."""
-    shader = _shader()
-    with gpu.matrix.push_pop():
+    shader, pushed = _shader(), cast(Any, gpu.matrix.push_pop())  # which the stubs make no context
+    with pushed:
         gpu.matrix.multiply_matrix(obj.matrix_world)
         shader.uniform_float("ModelViewMatrix", gpu.matrix.get_model_view_matrix())
         shader.uniform_float("ProjectionMatrix", gpu.matrix.get_projection_matrix())
@@ -134,16 +133,17 @@ def _new_batch(mesh: bpy.types.Mesh, points: Array, colors: Array, height: float
     columns = {"pos": points[corners], "normal": facing[loops], "color": colors[loops]}
     for name, values in columns.items():
         form.attr_add(id=name, comp_type="F32", len=values.shape[1], fetch_mode="FLOAT")
-    buffer = gpu.types.GPUVertBuf(form, len(loops))
+    buffer: Any = gpu.types.GPUVertBuf(form, len(loops))  # which takes arrays, though the stubs have none
     for name, values in columns.items():
         buffer.attr_fill(id=name, data=np.ascontiguousarray(values, dtype=np.float32))
     return gpu.types.GPUBatch(type="TRIS", buf=buffer)
 
 
 @lru_cache(maxsize=1)
-def _shader() -> gpu.types.GPUShader:
+def _shader() -> Any:
     """A shader that lights colors from where they are seen."""
-    info, passed = gpu.types.GPUShaderCreateInfo(), gpu.types.GPUStageInterfaceInfo("above")
+    info: Any = gpu.types.GPUShaderCreateInfo()
+    passed = gpu.types.GPUStageInterfaceInfo("above")
     passed.smooth("FLOAT", "facing")
     passed.smooth("VEC4", "tint")
     for kind, name in (
