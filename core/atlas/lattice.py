@@ -19,8 +19,8 @@ from .connectivity import Indices
 from .indicator import Indicator
 
 POINTS_AT_ONCE = 500_000  # A step takes about this many points of the lattice.
-CORNERS = np.array(list(np.ndindex(2, 2, 2)))  # Those of a cell, from its lowest.
-AROUND = np.array(list(np.ndindex(3, 3, 3))) - 1  # A point and its neighbors.
+CORNERS: Indices = np.array(list(np.ndindex(2, 2, 2)))  # Those of a cell, from its lowest.
+AROUND: Indices = np.array(list(np.ndindex(3, 3, 3))) - 1  # A point and its neighbors.
 CENTER = 13  # The point among these,
 BESIDE = np.flatnonzero(np.abs(AROUND).sum(axis=1) == 1)  # and those next to it; opposite ones add up to 26.
 # For each corner of a cell that the point may be, the corners of that cell among the neighbors, (8, 8).
