@@ -164,7 +164,7 @@ def meshed(
     std = np.where(surface.patch < 0, indicator.cell, surface.std)
     if ended is None:
         # Where no patch is, what is bridged may be anywhere within the span.
-        off[np.isinf(off) & np.isfinite(surface.triangle_rho)] = 0.0
+        off[np.isinf(off) & (surface.patch[surface.triangles] >= 0).any(axis=1)] = 0.0
         between = np.zeros(len(std))
         np.maximum.at(between, surface.triangles.ravel(), np.minimum(off, span / np.sqrt(3.0)).repeat(3))
         std = np.maximum(np.where(surface.patch < 0, 0.0, std), between)
