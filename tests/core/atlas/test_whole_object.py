@@ -453,3 +453,17 @@ def test_a_second_body_takes_no_more_touches_than_the_first():
     assert solids.topology(atlas.reference.mesh.triangles) == solids.Topology(0, 0, 4, 2)
     first = sum(r.frame.origin[0] > 0.0 for r in atlas.patches)
     assert len(atlas.patches) - first <= 1.5 * first
+
+
+@pytest.mark.parametrize(
+    ("solid", "most"), [(solids.ball(), (8, 12)), (solids.egg(), (9, 12)), (solids.ring(), (16, 26))]
+)
+def test_a_larger_tolerance_takes_fewer_touches_and_is_kept(solid, most):
+    """What the closed surface spans within the tolerance is only tapped."""
+    for tolerance, touches in zip((0.06, 0.02), most, strict=True):
+        atlas = explored(solid, tolerance=tolerance)
+        assert atlas.status == "ok"
+        assert len(atlas.patches) <= touches
+        for mesh in (atlas.reference.mesh, atlas.mesh(0.03)):
+            assert mesh.is_closed
+            assert np.abs(solid.distances(mesh.vertices)).max() < 3.0 * tolerance
