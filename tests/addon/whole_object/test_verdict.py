@@ -51,7 +51,7 @@ def test_a_cube_is_a_cube_with_sharp_edges(empty, extension):
     assert (record["status"], record["message"], record["is_closed"]) == ("ok", OK, True)
     assert record["deviation_max"] < 5e-4
     report = extension.tactile_addon.whole_object.object_report
-    agreement = "All of the surface is within the tolerance of 0.4 cm, and the farthest place is 0 cm off."
+    agreement = "All of the surface is within the tolerance of 0.4 cm, and the farthest place is 0.0174 cm off."
     rule = "Good means at least 99 % within it, and none farther off than 1.2 cm."
     assert report.object_verdict(record) == f"Good. {OK} {agreement} {rule}"
     assert report.is_all_within(record)
