@@ -61,11 +61,11 @@ def test_a_cube_is_a_cube_with_sharp_edges(empty, extension):
     assert report.agreement(far) == f"90 % of the surface is within the tolerance of 0.4 cm. {rule}"
     mesh = surface.data
     ends = np.array([edge.vertices for edge in mesh.edges])[values(mesh, "sharp_edge").astype(bool)]
-    at_faces = np.isclose(np.abs(positions(mesh)), 1.0, atol=1e-5).sum(axis=1)
+    at_faces = np.isclose(np.abs(positions(mesh)), 1.0, atol=5e-4).sum(axis=1)
     assert (at_faces[ends] >= 2).all()
     assert (at_faces == 3).sum() == 8
     lengths = np.linalg.norm(np.diff(positions(mesh)[ends], axis=1), axis=2)
-    assert lengths.sum() == pytest.approx(24.0, abs=1e-3)
+    assert lengths.sum() == pytest.approx(24.0, abs=1e-2)
 
 
 def test_growing_patches_are_above_the_mesh_and_each_other(empty, extension, touches_of):
