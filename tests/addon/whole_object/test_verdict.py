@@ -49,9 +49,9 @@ def test_a_cube_is_a_cube_with_sharp_edges(empty, extension):
     empty.ops.mesh.primitive_cube_add(size=2.0, location=(3.0, 0.0, 0.0))
     surface, record = touched(empty)
     assert (record["status"], record["message"], record["is_closed"]) == ("ok", OK, True)
-    assert record["deviation_max"] < 5e-4
+    assert record["deviation_max"] < 1e-5
     report = extension.tactile_addon.whole_object.object_report
-    agreement = "All of the surface is within the tolerance of 0.4 cm, and the farthest place is 0.0174 cm off."
+    agreement = "All of the surface is within the tolerance of 0.4 cm, and the farthest place is 0 cm off."
     rule = "Good means at least 99 % within it, and none farther off than 1.2 cm."
     assert report.object_verdict(record) == f"Good. {OK} {agreement} {rule}"
     assert report.is_all_within(record)
@@ -61,11 +61,11 @@ def test_a_cube_is_a_cube_with_sharp_edges(empty, extension):
     assert report.agreement(far) == f"90 % of the surface is within the tolerance of 0.4 cm. {rule}"
     mesh = surface.data
     ends = np.array([edge.vertices for edge in mesh.edges])[values(mesh, "sharp_edge").astype(bool)]
-    at_faces = np.isclose(np.abs(positions(mesh)), 1.0, atol=5e-4).sum(axis=1)
+    at_faces = np.isclose(np.abs(positions(mesh)), 1.0, atol=1e-5).sum(axis=1)
     assert (at_faces[ends] >= 2).all()
     assert (at_faces == 3).sum() == 8
     lengths = np.linalg.norm(np.diff(positions(mesh)[ends], axis=1), axis=2)
-    assert lengths.sum() == pytest.approx(24.0, abs=1e-2)
+    assert lengths.sum() == pytest.approx(24.0, abs=1e-3)
 
 
 def test_growing_patches_are_above_the_mesh_and_each_other(empty, extension, touches_of):
@@ -376,4 +376,4 @@ def test_the_largest_deviation_is_that_from_the_nearest_place(empty):
     off = np.maximum(
         outside, -beyond.max(axis=1)
     )  # The exact distance from a box; inside it is the least depth.
-    assert 0.9 * off.max() < record["deviation_max"]
+    assert 0.9 * off.max() < record["deviation_max"] < 1.5 * off.max()
