@@ -6,8 +6,10 @@ import zlib
 from time import perf_counter
 from typing import Any
 
+import bmesh
 import bpy
 import numpy as np
+from mathutils import Matrix
 from mathutils.bvhtree import BVHTree
 
 from .arrays import read_array
@@ -15,6 +17,7 @@ from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object,
 from .types import Array, Object, Point, Triple
 
 PAUSE = 50.0  # The time until the shape is compared again, as a multiple of the time that this takes.
+SIMILAR = 1e-5  # Lengths along all axes of an object are alike up to this share, which float32 numbers have.
 
 
 class DetachedMesh(PlacedMesh):
@@ -57,11 +60,15 @@ class DetachedMesh(PlacedMesh):
         # Loose vertices cannot be touched and may be far away.
         self.size = float((np.ptp(co[self.has_face], axis=0) * np.linalg.norm(linear, axis=0)).max())
         self.points = co @ linear.T
-        try:
-            # Its rays take half the time of the object's own.
-            self._tree = BVHTree.FromObject(obj, depsgraph)
-        except ValueError as error:
-            raise disabled(obj) from error
+        scale = np.linalg.norm(linear, axis=0).mean()
+        if np.allclose(linear.T @ linear, scale**2 * np.eye(3), rtol=0.0, atol=SIMILAR * scale**2):
+            try:
+                # Its rays take half the time of the object's own.
+                self._tree = BVHTree.FromObject(obj, depsgraph)
+            except ValueError as error:
+                raise disabled(obj) from error
+        else:
+            self._tree, linear = _tree_in_world(mesh, linear), np.eye(3)
         rays = self._tree.ray_cast
         super().__init__(linear, np.zeros(3), lambda *ray: rays(*ray)[:2])
 
@@ -125,3 +132,19 @@ class DetachedMesh(PlacedMesh):
         """The corners (k, 3) of a face, in order."""
         start, end = self._starts[number : number + 2]
         return self.points[self._corners[start:end]]
+
+
+def _tree_in_world(mesh: bpy.types.Mesh, linear: Array) -> BVHTree:
+    """The tree of a mesh in the directions of the world.
+
+    Under different scales along its axes, what is nearest in the mesh's own coordinates is not nearest here.
+    """
+    copy = bmesh.new()
+    try:
+        copy.from_mesh(mesh)
+        copy.transform(Matrix(linear.tolist()).to_4x4())
+        if np.linalg.det(linear) < 0.0:
+            bmesh.ops.reverse_faces(copy, faces=copy.faces[:])
+        return BVHTree.FromBMesh(copy)
+    finally:
+        copy.free()

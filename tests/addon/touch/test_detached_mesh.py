@@ -5,6 +5,7 @@
 What an operator does then is in tests/gui/stability.py and tests/gui/whole_object.py.
 """
 
+import numpy as np
 import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
@@ -100,3 +101,25 @@ def test_a_touch_within_one_bent_facet_is_about_that_facet_on_a_map_too(empty, e
     mesh = extension.tactile_addon.touch.detached_mesh.DetachedMesh(obj, depsgraph)
     found = extension.tactile_addon.scene.patch_record.reconstruction_of(patch)
     assert extension.core.has_few_facets(found, mesh.face_near, mesh.corners_of)
+
+
+@pytest.mark.parametrize("scale", [(1.0, 0.7, 0.04), (-1.0, 0.7, 0.04), (2.0, 2.0, 2.0), (-1.0, -1.0, -1.0)])
+def test_the_nearest_place_is_that_in_the_world_whatever_the_scale(empty, extension, scale):
+    """In the coordinates of a flat cube its end is nearer than its top."""
+    empty.ops.mesh.primitive_cube_add()
+    empty.context.object.scale = scale
+    empty.context.view_layer.update()
+    mesh = extension.tactile_addon.touch.detached_mesh.DetachedMesh
+    cube = mesh(empty.context.object, empty.context.evaluated_depsgraph_get())
+    half = np.abs(scale)
+    for point in np.random.default_rng(0).uniform(-0.99, 0.99, (200, 3)) * half:
+        depths = half - np.abs(point)
+        foot, normal, distance = cube.project(point.tolist())
+        assert distance == pytest.approx(depths.min(), abs=1e-6)
+        outward = np.zeros(3)
+        outward[depths.argmin()] = np.copysign(1.0, point[depths.argmin()])
+        assert tuple(normal) == pytest.approx(tuple(outward), abs=1e-6)
+        assert cube.feet(point[None])[0] == pytest.approx(np.array(foot), abs=1e-6)
+        hit, facing = cube.ray_cast((point + 3.0 * outward).tolist(), (-outward).tolist(), 9.0)
+        assert tuple(hit) == pytest.approx(tuple(foot), abs=5e-6)
+        assert tuple(facing) == pytest.approx(tuple(outward), abs=1e-6)

@@ -371,7 +371,9 @@ def test_the_largest_deviation_is_that_from_the_nearest_place(empty):
     half = np.array((1.0, 0.7, 0.04))
     empty.context.object.scale = half
     surface, record = touched(empty, noise=0.002, seed=4)
-    beyond = np.abs(positions(surface.data)) - half
+    faces = np.array([face.vertices for face in surface.data.polygons])
+    places, _ = scattered(positions(surface.data), faces, 20_000, np.random.default_rng(0))
+    beyond = np.abs(places) - half
     outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
     off = np.maximum(
         outside, -beyond.max(axis=1)
