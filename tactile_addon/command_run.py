@@ -117,17 +117,7 @@ def _arguments(options: argparse.Namespace) -> dict[str, Any]:
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """Opens the file, runs the operator, saves, and returns the report."""
-    if "files" in options and options.verify is not None and options.onto is None:
-        raise Misuse("--verify: expected --onto MESH too, the mesh to compare with")
-    if options.command == "fit" and options.target and options.onto is None:
-        raise Misuse("--target: expected --onto MESH too, the file that has this mesh")
-    _require_outputs(options)
-    if options.file is not None:
-        mesh_file.open_file(options.file)
-    if "files" not in options and getattr(options, "unit", None) is not None:
-        if bpy.data.filepath or options.file is None:
-            raise Misuse("--unit: expected a .ply, .stl or .obj file, because a .blend names its own unit")
-        _set_unit(options.unit)
+    _open(options)
     if options.command == "table":
         return {"rows": _write_table(options.output)}
     arguments = _arguments(options)
@@ -153,6 +143,21 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     if options.output is not None:
         _save(options.output, made)
     return report
+
+
+def _open(options: argparse.Namespace) -> None:
+    """Checks the options and opens the file. Raises Misuse where an option needs another."""
+    if "files" in options and options.verify is not None and options.onto is None:
+        raise Misuse("--verify: expected --onto MESH too, the mesh to compare with")
+    if options.command == "fit" and options.target and options.onto is None:
+        raise Misuse("--target: expected --onto MESH too, the file that has this mesh")
+    _require_outputs(options)
+    if options.file is not None:
+        mesh_file.open_file(options.file)
+    if "files" not in options and getattr(options, "unit", None) is not None:
+        if bpy.data.filepath or options.file is None:
+            raise Misuse("--unit: expected a .ply, .stl or .obj file, because a .blend names its own unit")
+        _set_unit(options.unit)
 
 
 def _require_outputs(options: argparse.Namespace) -> None:

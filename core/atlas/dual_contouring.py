@@ -24,7 +24,7 @@ from .lattice import Lattice, lattice_at_level, turned
 
 # python -m benchmarks.atlas --shapes judges these.
 BAND = 1.5  # Patches count within this many cells of the indicator, or pitches, of a point.
-CROSSED = 0.5  # A plane that passes an edge by so many pitches counts as well, if no other crosses it.
+CROSSED = 0.5  # A plane that passes an edge by this many pitches counts as well, if no other crosses it.
 SLACK = 1.0  # A vertex is at most this many pitches outside of its cell: the tip of a crease may be there.
 SOFT = 0.07  # A vertex does not move along planes that turn less, as mean squares of their sines: with .02 a
 # surface without creases has folds, as around Suzanne's eyes (some three times as many).
@@ -168,7 +168,7 @@ def _crossing(sheet: Blend, inner: Array, outer: Array) -> tuple[Array, Array]:
 
 
 def _least_uncertain(quads: Indices, planes: Blend, count: int) -> Blend:
-    """Of the planes (n,) around each of `count` cells, the sheets of least deviation.
+    """The sheets of least deviation among the planes (n,) around each of `count` cells.
 
     quads : (n, 4), the cells around each plane
     """

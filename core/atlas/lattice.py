@@ -133,7 +133,7 @@ def _edges_near(lattice: Lattice, low: Array, high: Array) -> Indices:
 
 
 def composed(lattice: Lattice, cells: Indices) -> Lattice:
-    """The lattice with points turned inside until these cells (n,), and all beside, are well-composed."""
+    """The lattice with points turned inside until these cells (n,) and their neighbors are well-composed."""
     is_composed, corner = _cases()
     while len(cells):
         codes = lattice.codes(cells)
@@ -174,6 +174,7 @@ def _cases() -> tuple[NDArray[np.bool_], Indices]:
     """
 
     def is_composed(code: int) -> bool:
+        """Whether no side on a face or in the cell has two opposite corners only."""
         inside = [code >> corner & 1 for corner in range(8)]
         faces = [
             inside[c] == inside[c ^ a ^ b] and inside[c ^ a] == inside[c ^ b] and inside[c] != inside[c ^ a]

@@ -332,7 +332,7 @@ class _Cloud(NamedTuple):
         return None, 0
 
     def explains(self, r: Reconstruction, some: NDArray[np.intp]) -> bool:
-        """Whether a patch explains some of the contacts, to which it was fitted, by their noise alone."""
+        """Whether a patch explains some of the contacts, to which it was fitted, within their noise."""
         far = np.zeros(len(self.contacts.points), dtype=bool)
         far[some] = too_far(self.distances(r, some), self.noise)
         return are_few(far[some], far[self.contacts.links[some]].any(axis=1))

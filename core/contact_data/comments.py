@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the comments of a table state beside its contacts: the unit, the reference point, noise, a ball."""
+"""What the comments of a table state about its contacts: the unit, the reference point, noise, a ball."""
 
 import re
 from collections.abc import Iterator

@@ -19,6 +19,9 @@ def too_far(distances: Array, stds: Array | float) -> NDArray[np.bool_]:
     return far
 
 
-def are_few(far: NDArray[np.bool_], beside: NDArray[np.bool_]) -> bool:
-    """Whether few contacts (n,) are too far from a surface, and none beside another; `beside` has where."""
-    return not (far.mean() > FEW or (far & beside).any())
+def are_few(far: NDArray[np.bool_], next_is_far: NDArray[np.bool_]) -> bool:
+    """Whether few contacts (n,) are too far from a surface, and no two neighbors.
+
+    next_is_far : (n,), whether a neighbor of each is too far
+    """
+    return not (far.mean() > FEW or (far & next_is_far).any())

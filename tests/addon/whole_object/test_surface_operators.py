@@ -70,7 +70,8 @@ def test_colors_show_how_far_long_edges_are_off(empty):
     record = surface["tactile_object"]
     assert record["deviation_max"] > 4.0 * record["tolerance"]
     off = np.abs(values(surface.data, "deviation"))
-    assert 0.7 * record["deviation_max"] < off.max() <= record["deviation_max"] * (1.0 + 1e-6)
+    # The tip of the cone is cut off, which places of the surface show less than the tip itself.
+    assert 0.5 * record["deviation_max"] < off.max() <= record["deviation_max"] * (1.0 + 1e-6)
     place = np.subtract(record["deviation_place"], record["origin"])
     nearest = np.argmin(np.linalg.norm(positions(surface.data) - place, axis=1))
     assert off[nearest] > record["tolerance"]
