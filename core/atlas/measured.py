@@ -304,10 +304,8 @@ class _Cloud(NamedTuple):
 
         domain = r.domain.radii(AZIMUTHS) / r.radius
         near = self.same_sheet(i, 2.0 * r.radius)
-        shares, turns = (
-            np.arange(1, RAY_PLACES + 1) / RAY_PLACES,
-            2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS,
-        )
+        shares = np.arange(1, RAY_PLACES + 1) / RAY_PLACES
+        turns = 2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
         x, y = r.radius * (shares[:, None, None] * domain[:, None] * ways).reshape(-1, 2).T
         places = r.frame.origin + np.stack([x, y, r.height(x, y)], axis=1) @ r.frame.axes.T

@@ -278,7 +278,7 @@ def _is_sure(found: Exploration, options: ExplorationOptions) -> bool:
 
 
 def _explains(found: Exploration, options: ExplorationOptions) -> bool:
-    """Whether the patch explains the contacts of its contours, or is off them by no more than the deviation allowed."""
+    """Whether the patch explains the contacts of its contours, or is within the largest deviation of them."""
     r = found.result
     x, y, z = r.frame.to_local(np.concatenate([contour.points for contour in found.contours])).T
     off, noise = z - r.height(x, y), max(options.noise, float(r.posterior.noise) * r.radius)

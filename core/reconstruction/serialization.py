@@ -23,9 +23,7 @@ from .status import Taps
 
 VERSION = 4
 ORTHONORMAL = 1e-6  # Axes may be off by so much, because files may have them in single precision.
-FARTHEST = (
-    10.0  # Contacts and ends of curves are within this many radii of the origin: L is the farthest one.
-)
+FARTHEST = 10.0  # Contacts and ends of curves are within this many radii of the origin, the farthest at L.
 WIDEST = 1e3  # The root of a covariance in unit radius has no larger numbers; the prior's have some 1.
 COEFFICIENTS = [terms_to(degree) - FREE for degree in range(2, 7)]  # Numbers of coefficients by degree.
 
