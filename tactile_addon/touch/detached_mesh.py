@@ -145,6 +145,7 @@ def _tree_in_world(mesh: bpy.types.Mesh, linear: Array) -> BVHTree:
         copy.transform(Matrix(linear.tolist()).to_4x4())
         if np.linalg.det(linear) < 0.0:
             bmesh.ops.reverse_faces(copy, faces=copy.faces[:])
+        copy.normal_update()
         return BVHTree.FromBMesh(copy)
     finally:
         copy.free()

@@ -105,21 +105,35 @@ def test_a_touch_within_one_bent_facet_is_about_that_facet_on_a_map_too(empty, e
 
 @pytest.mark.parametrize("scale", [(1.0, 0.7, 0.04), (-1.0, 0.7, 0.04), (2.0, 2.0, 2.0), (-1.0, -1.0, -1.0)])
 def test_the_nearest_place_is_that_in_the_world_whatever_the_scale(empty, extension, scale):
-    """In the coordinates of a flat cube its end is nearer than its top."""
-    empty.ops.mesh.primitive_cube_add()
+    """In the coordinates of a flat cube its end is nearer than its top. Another turn makes a slanted box."""
+    empty.ops.mesh.primitive_cube_add(rotation=(0.4, 0.5, 0.6))
     empty.context.object.scale = scale
     empty.context.view_layer.update()
     mesh = extension.tactile_addon.touch.detached_mesh.DetachedMesh
     cube = mesh(empty.context.object, empty.context.evaluated_depsgraph_get())
-    half = np.abs(scale)
-    for point in np.random.default_rng(0).uniform(-0.99, 0.99, (200, 3)) * half:
-        depths = half - np.abs(point)
+    axes, half = np.array(empty.context.object.rotation_euler.to_matrix()), np.abs(scale)
+    for local in np.random.default_rng(0).uniform(-0.99, 0.99, (200, 3)) * half:
+        depths, point = half - np.abs(local), axes @ local
+        axis = depths.argmin()
+        outward = np.copysign(1.0, local[axis]) * axes[:, axis]
         foot, normal, distance = cube.project(point.tolist())
         assert distance == pytest.approx(depths.min(), abs=1e-6)
-        outward = np.zeros(3)
-        outward[depths.argmin()] = np.copysign(1.0, point[depths.argmin()])
-        assert tuple(normal) == pytest.approx(tuple(outward), abs=1e-6)
+        assert tuple(normal) == pytest.approx(tuple(outward), abs=1e-5)
         assert cube.feet(point[None])[0] == pytest.approx(np.array(foot), abs=1e-6)
         hit, facing = cube.ray_cast((point + 3.0 * outward).tolist(), (-outward).tolist(), 9.0)
         assert tuple(hit) == pytest.approx(tuple(foot), abs=5e-6)
-        assert tuple(facing) == pytest.approx(tuple(outward), abs=1e-6)
+        assert tuple(facing) == pytest.approx(tuple(outward), abs=1e-5)
+
+
+@pytest.mark.parametrize("scale", [(1.0, 2.0, 3.0), (-1.0, 2.0, 3.0)])
+def test_normals_are_those_of_the_scaled_mesh(empty, ball, extension, scale):
+    ball.scale = scale
+    empty.context.view_layer.update()
+    mesh = extension.tactile_addon.touch.detached_mesh.DetachedMesh(
+        ball, empty.context.evaluated_depsgraph_get()
+    )
+    for way in np.random.default_rng(1).normal(size=(100, 3)):
+        way /= np.linalg.norm(way)
+        hit, normal = mesh.ray_cast((20.0 * way).tolist(), (-way).tolist(), 40.0)
+        gradient = np.array(hit) / np.square(scale)
+        assert np.array(normal) @ gradient / np.linalg.norm(gradient) > 0.97
