@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..steps import chunked
-from ..triangles import normalized, triangle_cross
+from ..triangles import normalized, row_dot, triangle_cross
 from .charts import Charts
 from .connectivity import Indices, connected_pieces, keyed_sides
 from .dual_contouring import PLACES_AT_ONCE, Surface, dual_contour
@@ -109,7 +109,7 @@ class MeasuredContacts(NamedTuple):
     links: Indices
 
     def off(self, points: Array, normals: Array) -> Array:
-        """How far contacts are from places (k, 3) with normals (k, 3) between them, (k,).
+        """How far the nearest contacts are above or below places (k, 3) with normals (k, 3), (k,).
 
         It is inf for places that are not between contacts, or if none near them faces alike.
         """
@@ -120,7 +120,7 @@ class MeasuredContacts(NamedTuple):
         ways = normalized(self.points[self.links[at]] - points[:, None, None])
         between = np.linalg.norm(ways.mean(axis=2), axis=2) < ONE_SIDED
         is_felt = (alike & between & (away < BETWEEN * self.reach[at])).any(axis=1)
-        return np.where(is_felt, away[:, 0], np.inf)
+        return np.where(is_felt, np.abs(row_dot(self.points[at[:, 0]] - points, normals)), np.inf)
 
 
 def memory_of(vertices: Array, triangles: Indices, edge: float) -> float:

@@ -8,15 +8,13 @@ Gumhold 2009), also across a sharp edge, a wall or a gap. Links along strokes co
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..arguments import Array
-from ..steps import result_of
 from ..triangles import normalized, row_dot
 from .connectivity import Indices, connected_pieces
-from .indicator import solve_poisson
 
 # python -m benchmarks.measured --orientation judges these.
 FEWEST, MOST, MORE = 8, 600, 1.5  # The numbers of a plane's neighbors, and their growth until it is certain:
@@ -35,11 +33,12 @@ OPPOSED = -0.3  # A link contradicts the sides of its contacts if its cosine is 
 DOUBTED = 0.02  # Not more contacts than this share may contradict their neighbors,
 CONFUSED = 0.05  # and not more than this share may have the other side of a wall among their neighbors.
 FACING = 0.8  # Contacts face each other across a wall if they and the way between them do by this cosine.
-CLOSED = 0.15  # Contacts show their outer side if the mean of the indicator there is more.
+CLOSED = 0.15  # Contacts show their outer side if the mean of their winding numbers is more.
 DECISIVE = 0.3  # A hint decides if the mean cosine between it and the normals is more.
-FINEST, COARSEST = 1.0 / 200.0, 1.0 / 20.0  # Cells of the indicator are between these shares of the size.
-WRONG = 0.75  # Pieces face the wrong way where it is farther than this from a half,
-ROUNDS = 4  # and are turned this often.
+CERTAIN = 0.02  # Links of less weight are certain,
+SMALL = 0.1  # and a region has at least this share of all contacts.
+ROUNDS = 3  # Regions are tried this often.
+PROBES = 30  # Winding numbers are computed at this many contacts of a region.
 
 
 class Planes(NamedTuple):
@@ -132,9 +131,10 @@ def oriented(
     points = np.vstack(list(strokes))
     links = _links(points, planes, [len(stroke) for stroke in strokes])
     links = _bridged(points, planes.normals, *links)
-    normals = _propagated_signs(points, planes.normals, *links)[:, None] * planes.normals
-    flips, number = _signs_by_indicator(points, normals, planes)
-    normals *= flips[:, None]
+    sides, region = _propagated_signs(points, planes.normals, *links)
+    normals = sides[:, None] * planes.normals
+    flips, number = _winding_signs(points, normals, planes.areas, region)
+    normals *= flips[region, None]
     return normals * _global_sign(normals, known, up, number)
 
 
@@ -179,8 +179,13 @@ def _bridged(
             weights = np.append(weights, far + _weights(points, normals, a, b))
 
 
-def _propagated_signs(points: Array, normals: Array, i: Indices, j: Indices, weights: Array) -> Array:
-    """The sides (n,), 1 or -1, of normals (n, 3) that follow from the first by the minimal tree of links."""
+def _propagated_signs(
+    points: Array, normals: Array, i: Indices, j: Indices, weights: Array
+) -> tuple[Array, Indices]:
+    """The sides (n,), 1 or -1, of normals (n, 3) that follow from the first along the minimal tree of links.
+
+    Also the regions (n,) that uncertain links of the tree separate from each other.
+    """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
@@ -189,35 +194,68 @@ def _propagated_signs(points: Array, normals: Array, i: Indices, j: Indices, wei
     votes = coo_matrix((cosine / weights, (np.minimum(i, j), np.maximum(i, j))), (n, n)).tocsr()
     votes.sum_duplicates()
     votes.data = 1.0 / np.maximum(np.abs(votes.data), LEAST_VOTE)
-    order, before = breadth_first_order(minimum_spanning_tree(votes), 0, directed=False)
+    tree = minimum_spanning_tree(votes)
+    order, before = breadth_first_order(tree, 0, directed=False)
     cosine, _ = reflection_agreement(points, normals, before[order[1:]], order[1:])
     sides = [1.0] * n
     for at, past, same in zip(order[1:].tolist(), before[order[1:]].tolist(), cosine.tolist(), strict=True):
         sides[at] = sides[past] if same > 0.0 else -sides[past]
-    return np.array(sides)
+    return np.array(sides), _regions(tree.tocoo(), n)
 
 
-def _signs_by_indicator(points: Array, normals: Array, planes: Planes) -> tuple[Array, float]:
-    """The signs (n,) of normals (n, 3) that bring the indicator at contacts nearer to a half; its mean there.
+def _regions(tree: Any, n: int) -> Indices:
+    """The regions (n,) of a tree that its uncertain links separate; small ones join adjacent ones."""
+    certain = tree.data < CERTAIN
+    count, region = connected_pieces(tree.row[certain], tree.col[certain], n)
+    sizes, first = np.bincount(region).tolist(), list(range(count))
 
-    On a closed surface the indicator is 1 inside, 0 outside and a half on it. Where it is below 0 or above 1
-    by more than a quarter, contacts belong to a piece that faces the other way.
+    def of(one: int) -> int:
+        """The region that another is a part of by now."""
+        while first[one] != one:
+            one = first[one]
+        return one
+
+    rest = np.flatnonzero(~certain)
+    for k in rest[np.argsort(tree.data[rest], kind="stable")].tolist():
+        a, b = of(int(region[tree.row[k]])), of(int(region[tree.col[k]]))
+        if a != b and min(sizes[a], sizes[b]) < SMALL * n:
+            first[max(a, b)] = min(a, b)
+            sizes[min(a, b)] = sizes[a] + sizes[b]
+    return np.unique([of(one) for one in range(count)], return_inverse=True)[1][region]
+
+
+def _winding_signs(points: Array, normals: Array, areas: Array, region: Indices) -> tuple[Array, float]:
+    """The signs (k,) of regions that bring winding numbers at contacts nearest to a half; their mean.
+
+    The sum of squares is minimized by coordinate descent over single regions and all of them, ROUNDS times.
+    On a closed surface the winding number is 1 inside, 0 outside and a half on it (Barill et al. 2018).
     """
-    size = float(np.ptp(points, axis=0).max())
-    cell = float(np.clip(0.5 * np.median(planes.reach), FINEST * size, COARSEST * size))
-    signs = np.ones(len(points))
-    for _ in range(ROUNDS):
-        indicator = result_of(solve_poisson(points, (signs * planes.areas)[:, None] * normals, cell, np.inf))
-        number = indicator.at(points) - float(indicator.values[0, 0, 0])
-        wrong = np.abs(number[planes.links].mean(axis=1) - 0.5) > WRONG
-        if not wrong.any():
-            break
-        signs[wrong] *= -1.0
-    return signs, float(number.mean())
+    count = int(region.max()) + 1
+    rng = np.random.default_rng(0)
+    numbers, sizes = np.zeros((count, count)), np.bincount(region)
+    for one in range(count):
+        some = rng.permutation(np.flatnonzero(region == one))[:PROBES]
+        for at in some:
+            off = points - points[at]
+            away = np.maximum(np.linalg.norm(off, axis=1), np.sqrt(areas[at]))
+            angle = areas * row_dot(off, normals) / away**3
+            numbers[one] += np.bincount(region, angle, count) / (4.0 * np.pi * len(some))
+    sides = np.ones(count)
+
+    def off_half(sides: Array) -> float:
+        """The mean square by which winding numbers are off a half."""
+        return float(sizes @ (numbers @ sides - 0.5) ** 2)
+
+    best = off_half(sides)
+    for flipped in [*np.eye(count, dtype=bool), np.ones(count, dtype=bool)] * ROUNDS:
+        tried = np.where(flipped, -sides, sides)
+        if (off := off_half(tried)) < best * (1.0 - 1e-9):
+            sides, best = tried, off
+    return sides, float(sizes @ (numbers @ sides)) / len(points)
 
 
 def _global_sign(normals: Array, known: Array | None, up: Array | None, number: float) -> float:
-    """1, or -1 if normals (n, 3) face inward, as measured normals, a hint or the indicator have it.
+    """1, or -1 if normals (n, 3) face inward, as measured normals, a hint or the winding number have it.
 
     Raises ValueError if nothing of these is decisive.
     """
