@@ -63,7 +63,8 @@ def test_a_surface_is_where_the_object_is(rows):
         assert deviations.mean() == pytest.approx(row["deviation_mean"], abs=1e-3)
         assert row["deviation_mean"] < row["deviation_max"]
         if name == "ball":  # Its mesh has a hole at each pole, which the surface has not.
-            assert row["deviation_max"] == pytest.approx(HOLE, rel=0.02)
+            # Its farthest place has the distance from the pole that is missing to the hole's radius.
+            assert 0.9 * HOLE < row["deviation_max"] < 1.02 * HOLE
             assert (
                 row["status"] == "uncertain" and "off the object, whose mesh has open edges" in row["message"]
             )
