@@ -98,6 +98,23 @@ def prism(sides, radius=1.0, half=0.6):
     )
 
 
+def bracket(turn, inner=0.35, height=0.4):
+    """Two walls of thickness `inner` that meet at a right angle, as an L of size 1; `turn` is (3, 3)."""
+    rows = np.asarray(turn).tolist()
+
+    def distance(x, y, z):
+        u, v, w = (r[0] * x + r[1] * y + r[2] * z for r in rows)
+        outer = max(abs(u - 0.5) - 0.5, abs(v - 0.5) - 0.5, abs(w) - 0.5 * height)
+        return max(outer, min(u, v) - inner)
+
+    along = np.asarray(turn)
+    return Solid(
+        distance,
+        tuple((0.4 * along[0] + 0.1 * along[1] + 0.5 * height * along[2]).tolist()),
+        tuple(along[2].tolist()),
+    )
+
+
 def cone(radius=0.4, height=1.0):
     """A cone on the plane z = 0, with its tip on z."""
     slope = math.hypot(radius, height)

@@ -32,20 +32,20 @@ ITERATIONS = 4  # With one, a cube's edges are off by 1e-4 of its size.
 SWEEPS = 12  # A vertex that is held near its cell is moved along each axis this often.
 LEVEL = 1e-6  # The weight of the indicator's level beside planes of patches.
 FACING = 0.95  # A sheet faces as the planes of a vertex do if the cosine between their normals is more.
+# A quadrilateral whose diagonals are this many pitches apart has a vertex of its own, at the place nearest to
+BENT = 0.1  # the planes around its four cells. Without, an L is off by over five tolerances at its corners.
 PLACES_AT_ONCE = 3000  # A step takes this many places.
 
 
 class Sides(NamedTuple):
-    """Sheets near the points of a lattice (n,).
+    """The sheets nearest to the points of a lattice (n,).
 
     points : (n,), in order
-    inside, outside : the nearest sheets; if these put them elsewhere, the nearest ones that put them there
     side : (n,), -1 or 1 if patches put them inside or outside, and no patch near denies it; otherwise 0
     """
 
     points: Indices
-    inside: Blend
-    outside: Blend
+    sheet: Blend
     side: Array
 
 
@@ -77,14 +77,20 @@ def dual_contour(charts: Charts, indicator: Indicator, pitch: float) -> Generato
     cells, index = np.unique(quads, return_inverse=True)
     quads = index.reshape(-1, 4)
     yield 0.7
-    vertices, up = _vertices(quads, places, planes, lattice.places(cells), pitch)
+    around = np.arange(len(quads)).repeat(4), quads.ravel()
+    vertices, up = _vertices(*around, places, planes, lattice.places(cells) + 0.5 * pitch, pitch)
+    quads, bent = _cut(vertices, quads, planes.normal, pitch)
+    middles = _vertices(
+        *_planes_around(quads, bent), places, planes, vertices[quads[bent]].mean(axis=1), pitch
+    )
+    vertices, up = (np.concatenate(both) for both in zip((vertices, up), middles, strict=True))
     yield 0.8
-    own = _least_uncertain(quads, planes, len(cells))
+    own = planes.at(np.append(_least_uncertain(quads, planes, len(cells)), bent))
     steps = chunked(partial(_on_sheet, charts, pitch), PLACES_AT_ONCE, 0.9, vertices, up, *own)
     vertices, *fields = yield from steps
     sheet = Blend(*fields)
-    triangles = _cut(vertices, quads, planes.normal)
-    return Surface(vertices, triangles, sheet.std, sheet.patch, sheet.rho, np.tile(planes.rho, 2))
+    triangles, quad = _triangles(quads, bent, len(cells))
+    return Surface(vertices, triangles, sheet.std, sheet.patch, sheet.rho, planes.rho[quad])
 
 
 def _turned_at_creases(
@@ -111,8 +117,7 @@ def _turned_at_creases(
         order = np.argsort(points, kind="stable")
         points = points[order]
         fields = tuple(np.concatenate(both)[order] for both in zip(fields, parts, strict=True))
-    half = len(Blend._fields)
-    return lattice, edges, Sides(points, Blend(*fields[:half]), Blend(*fields[half:-1]), fields[-1])
+    return lattice, edges, Sides(points, Blend(*fields[:-1]), fields[-1])
 
 
 def _sides(charts: Charts, cell: float, band: float, places: Array) -> tuple[Any, ...]:
@@ -121,14 +126,14 @@ def _sides(charts: Charts, cell: float, band: float, places: Array) -> tuple[Any
     cell : only places that are nearer to a patch have a side
     """
     pairs, count = charts.pairs(places, band), len(places)
-    every, side, found = nearest_sheet(charts, pairs, count), np.zeros(count), []
-    for way in (-1.0, 1.0):
-        sheet = nearest_sheet(charts, pairs.chosen(np.sign(pairs.distance) == way), count)
-        side += np.where(sheet.patch < 0, 0.0, way)
-        found += [*sheet.where((sheet.patch >= 0) & (every.distance * way <= 0.0), every)]
+    inside, outside = (
+        np.bincount(pairs.point_index[which], minlength=count) > 0
+        for which in (pairs.distance < 0.0, pairs.distance > 0.0)
+    )
     away = np.full(count, np.inf)
     np.minimum.at(away, pairs.point_index, distances_within_rims(charts, pairs))
-    return *found, np.where(away < cell, side, 0.0)
+    side = np.where(away < cell, outside.astype(np.float64) - inside, 0.0)
+    return *nearest_sheet(charts, pairs, count), side
 
 
 def _planes(lattice: Lattice, sides: Sides, edges: Indices) -> tuple[Array, Blend]:
@@ -140,8 +145,8 @@ def _planes(lattice: Lattice, sides: Sides, edges: Indices) -> tuple[Array, Blen
     one, other = lattice.ends(edges)
     is_inside = lattice.inside(one)
     inner, outer = np.where(is_inside, one, other), np.where(is_inside, other, one)
-    a = sides.inside.at(np.searchsorted(sides.points, inner))
-    b = sides.outside.at(np.searchsorted(sides.points, outer))
+    a = sides.sheet.at(np.searchsorted(sides.points, inner))
+    b = sides.sheet.at(np.searchsorted(sides.points, outer))
     origin = lattice.places(inner)
     way = lattice.places(outer) - origin
     from_a, missed_a = _crossing(a, a.distance, a.distance + row_dot(a.normal, way))
@@ -167,33 +172,33 @@ def _crossing(sheet: Blend, inner: Array, outer: Array) -> tuple[Array, Array]:
     return shares, np.where(is_crossed, np.maximum(np.abs(shares - 0.5) - 0.5, 0.0), np.inf)
 
 
-def _least_uncertain(quads: Indices, planes: Blend, count: int) -> Blend:
-    """The sheets of least deviation among the planes (n,) around each of `count` cells.
+def _least_uncertain(quads: Indices, planes: Blend, count: int) -> Indices:
+    """The planes (count,) of least deviation among those (n,) around each cell.
 
     quads : (n, 4), the cells around each plane
     """
     order = np.argsort(-planes.std, kind="stable")
     best = np.zeros(count, dtype=np.intp)
     best[quads[order]] = order[:, None]
-    return planes.at(best)
+    return best
 
 
 def _vertices(
-    quads: Indices, places: Array, planes: Blend, corners: Array, pitch: float
+    plane: Indices, cell: Indices, places: Array, planes: Blend, centers: Array, pitch: float
 ) -> tuple[Array, Array]:
-    """The vertices (m, 3) of cells whose lowest corners are given, (m, 3), and mean normals (m, 3) there.
+    """The vertices (m, 3) of cells with centers (m, 3), and mean normals (m, 3) there.
 
     They minimize the squares of distances to planes, from the mean of the places where these cross edges.
 
-    quads : (n, 4), the cells around planes (n,) through places (n, 3)
+    plane, cell : (k,), which of the planes (n,) through places (n, 3) are around which cell
     """
-    count, normals, cells = len(corners), planes.normal, quads.ravel()
-    weights = np.repeat(np.where(planes.patch < 0, LEVEL, 1.0), 4)
-    total = np.bincount(cells, weights, count)
+    count, normals = len(centers), planes.normal
+    weights = np.where(planes.patch < 0, LEVEL, 1.0)[plane]
+    total = np.bincount(cell, weights, count)
 
     def mean(values: Array) -> Array:
-        """Means (m, k) of values (n, k) over the planes around each cell."""
-        sums = [np.bincount(cells, weights * np.repeat(column, 4), count) for column in values.T]
+        """Means (m, i) of values (n, i) over the planes around each cell."""
+        sums = [np.bincount(cell, weights * column[plane], count) for column in values.T]
         return np.stack(sums, axis=1) / total[:, None]
 
     middle, up = mean(places), mean(normals)
@@ -206,7 +211,7 @@ def _vertices(
     for _ in range(ITERATIONS):
         left = right - np.einsum("mij,mj->mi", square, step)
         step += np.linalg.solve(soft, square @ left[..., None])[..., 0]
-    low, high = corners - SLACK * pitch - middle, corners + (1.0 + SLACK) * pitch - middle
+    low, high = (centers + side * (0.5 + SLACK) * pitch - middle for side in (-1.0, 1.0))
     out = np.flatnonzero(((step < low) | (step > high)).any(axis=1))
     right = np.einsum("mij,mj->mi", square, right)
     step[out] = _held(soft[out], right[out], low[out], high[out])
@@ -238,8 +243,13 @@ def _on_sheet(charts: Charts, reach: float, vertices: Array, up: Array, *own: An
     return moved, *sheet.where(is_facing, Blend(*own))
 
 
-def _cut(vertices: Array, quads: Indices, normals: Array) -> Indices:
-    """Quadrilaterals (n, 4) cut along the diagonal whose triangles (2 n, 3) face as normals (n, 3) do."""
+def _cut(vertices: Array, quads: Indices, normals: Array, pitch: float) -> tuple[Indices, Indices]:
+    """Quadrilaterals (n, 4) turned so that their first diagonal cuts them, and those (m,) that are bent.
+
+    It is the diagonal whose triangles face as normals (n, 3) do. Where the two pass each other at a distance
+    there is a crease or a corner that no vertex is on.
+    """
+    other = np.roll(quads, -1, axis=1)
 
     def facing(some: Indices) -> Array:
         """The least cosine (n,) between the two triangles of quadrilaterals and their normals."""
@@ -248,6 +258,32 @@ def _cut(vertices: Array, quads: Indices, normals: Array) -> Indices:
         least: Array = np.minimum(one, other)
         return least
 
-    other = np.roll(quads, -1, axis=1)
     quads = np.where((facing(quads) >= facing(other))[:, None], quads, other)
-    return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    a, b, c, d = vertices[quads.T]
+    apart = np.abs(row_dot(a + c - b - d, normalized(np.cross(c - a, d - b))))
+    return quads, np.flatnonzero(apart > 2.0 * BENT * pitch)
+
+
+def _planes_around(quads: Indices, bent: Indices) -> tuple[Indices, Indices]:
+    """The planes (k,) around the four cells of bent quadrilaterals (m,), and for each which of these it is.
+
+    quads : (n, 4), the cells around each plane
+    """
+    from scipy.sparse import csr_array
+
+    ends = np.arange(0, 4 * len(quads) + 1, 4)
+    cells = csr_array((np.ones(4 * len(quads)), quads.ravel(), ends))
+    shared = (cells[bent] @ cells.T).tocoo()
+    return shared.col, shared.row
+
+
+def _triangles(quads: Indices, bent: Indices, first: int) -> tuple[Indices, Indices]:
+    """The triangles (k, 3) of quadrilaterals (n, 4), and of which each is one, (k,).
+
+    bent : (m,), those with a vertex in their middle: `first` and the following
+    """
+    flat = np.setdiff1d(np.arange(len(quads)), bent)
+    middles = np.arange(first, first + len(bent))
+    sides = [np.column_stack([quads[bent][:, [i, (i + 1) % 4]], middles]) for i in range(4)]
+    halves = [quads[flat][:, each] for each in ([0, 1, 2], [0, 2, 3])]
+    return np.concatenate(halves + sides), np.concatenate([np.tile(flat, 2), np.tile(bent, 4)])

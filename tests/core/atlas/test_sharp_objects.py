@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import core
 from core.atlas.reference_mesh import ReferenceMesh, closest_point
@@ -116,6 +117,17 @@ def test_edges_are_straight_to_half_a_tolerance(block):
             feet, _ = closest_point(triangles[near], points[:, None])
             off = np.linalg.norm(feet - points[:, None], axis=2).min(axis=1)
             assert np.percentile(off, 95) < 0.5 * TOLERANCE
+
+
+@pytest.mark.parametrize("seed", [1, 9, 13])
+def test_no_triangle_bridges_a_concave_edge_or_cuts_a_corner(seed):
+    bracket = solids.bracket(Rotation.random(random_state=seed).as_matrix())
+    atlas = explored(bracket, tolerance=2e-3, noise=0.0)
+    assert atlas.status == "ok"
+    mesh = atlas.mesh(0.02)
+    assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 2, 1)
+    off = np.abs(bracket.distances(mesh.vertices[mesh.triangles].mean(axis=1)))
+    assert off.max() < 1.5 * 2e-3
 
 
 @pytest.fixture(scope="module")
