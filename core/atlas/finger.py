@@ -70,10 +70,13 @@ class Finger(NamedTuple):
         """The first contact of a finger that comes along a unit direction, or None."""
         return self._felt(self.surface.ray_cast(start, way, length), way)
 
+    def tapped(self, point: Vector, normal: Vector, length: float) -> Contact | None:
+        """The contact along a normal within a length of a point, of a finger that comes from above."""
+        return self.met(along(point, normal, length), scaled(normal, -1.0), 2.0 * length)
+
     def near(self, point: Vector, normal: Vector, length: float) -> Contact | None:
         """The contact along a normal within a length of a point, if the surface there faces the same way."""
-        down = scaled(normal, -1.0)
-        felt = self.met(along(point, normal, length), down, 2.0 * length)
+        felt = self.tapped(point, normal, length)
         return felt if felt is not None and dot(felt[1], normal) > SAME_SHEET_COSINE else None
 
     def _felt(self, hit: Hit | None, way: Vector) -> Contact | None:
