@@ -32,7 +32,7 @@ from .contours.finger import Surface
 from .contours.local_geometry import DegenerateCurvesError, Frame
 from .contours.tracking import track
 from .exploration.extent import Exploration
-from .exploration.mesh_error import MeshError, judged_by_mesh, mesh_error
+from .exploration.mesh_error import MeshError, doubts_by_mesh, mesh_error
 from .exploration.options import ExplorationOptions
 from .exploration.side_by_side import exploring_many
 from .exploration.touches import explore, explore_many
@@ -51,6 +51,7 @@ from .scan.facets import has_few_facets, is_beside_bend
 from .scan.pose_search import Pose, register
 from .scan.sampling import scattered, spaced, spaced_count
 from .scan.verification import reachable, verify, verifying
+from .verdict import OK, UNCERTAIN, Doubt, status_of
 
 __version__ = "0.1.0"  # That of blender_manifest.toml; python -m tools.release compares them.
 __all__ = [
@@ -61,7 +62,9 @@ __all__ = [
     "METHODS",
     "NOT_MONGE",
     "NO_CONTACT",
+    "OK",
     "SOLVERS",
+    "UNCERTAIN",
     "UNEXPLAINED",
     "UNIT_METERS",
     "WHERE",
@@ -70,6 +73,7 @@ __all__ = [
     "Contour",
     "DegenerateCurvesError",
     "Domain",
+    "Doubt",
     "Edge",
     "Exploration",
     "ExplorationOptions",
@@ -92,6 +96,7 @@ __all__ = [
     "cover_contacts",
     "covered_by",
     "distances",
+    "doubts_by_mesh",
     "expected_touches",
     "explore",
     "explore_many",
@@ -103,7 +108,6 @@ __all__ = [
     "has_few_facets",
     "in_running_order",
     "is_beside_bend",
-    "judged_by_mesh",
     "mean_height_stds",
     "mesh_error",
     "overlapped",
@@ -115,6 +119,7 @@ __all__ = [
     "shortest_edge",
     "spaced",
     "spaced_count",
+    "status_of",
     "stops_at",
     "suggest_plane",
     "thinnest_wall",

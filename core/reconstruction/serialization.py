@@ -32,8 +32,8 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
     """A reconstruction as JSON has it: a dict of numbers, words, lists and dicts, which `from_dict` reads.
 
     Lengths are in the caller's unit, those of the geometry in its frame. `noise`, `point_std` and `posterior`
-    are in units of the radius; the latter is None for the paper's methods, whose surface is `patch`. `status`
-    and `message` are for readers only: they follow from the rest.
+    are in units of the radius; the latter is None for the paper's methods, whose surface is `patch`. What is
+    for readers only follows from the rest: `status`, `message` and `doubts`.
     """
     posterior = r.posterior if r.method == "bayes" else None
     return {
@@ -41,6 +41,7 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
         "method": r.method,
         "status": r.status,
         "message": r.message,
+        "doubts": [doubt.to_dict() for doubt in r.doubts],
         "converged": r.converged,
         "noise": r.noise,
         "point": r.point.tolist(),

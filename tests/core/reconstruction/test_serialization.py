@@ -80,7 +80,7 @@ def damaged(path, value):
     return d
 
 
-KEYS = sorted(set(to_dict(RESULTS[0])) - {"status", "message"})
+KEYS = sorted(set(to_dict(RESULTS[0])) - {"status", "message", "doubts"})
 
 
 VALUES = [None, "ball", float("nan"), [], {}, [[1.0]], [{}], -1]
