@@ -47,11 +47,11 @@ from .reconstruction.options import METHODS
 from .reconstruction.result import Reconstruction
 from .reconstruction.serialization import from_dict, to_dict
 from .reconstruction.status import CONTRADICTING, DOUBTFUL_STD
-from .scan.facets import has_few_facets, is_beside_bend
+from .scan.facets import is_beside_bend, with_facets
 from .scan.pose_search import Pose, register
 from .scan.sampling import scattered, spaced, spaced_count
 from .scan.verification import reachable, verify, verifying
-from .verdict import OK, UNCERTAIN, Doubt, status_of
+from .verdict import FINER, OK, SHORTER_EDGES, UNCERTAIN, Doubt, status_of
 
 __version__ = "0.1.0"  # That of blender_manifest.toml; python -m tools.release compares them.
 __all__ = [
@@ -59,10 +59,12 @@ __all__ = [
     "CREASE",
     "DOUBTFUL_STD",
     "EXTENT",
+    "FINER",
     "METHODS",
     "NOT_MONGE",
     "NO_CONTACT",
     "OK",
+    "SHORTER_EDGES",
     "SOLVERS",
     "UNCERTAIN",
     "UNEXPLAINED",
@@ -105,7 +107,6 @@ __all__ = [
     "fit_error",
     "from_dict",
     "gaussian_curvature_stds",
-    "has_few_facets",
     "in_running_order",
     "is_beside_bend",
     "mean_height_stds",
@@ -129,5 +130,6 @@ __all__ = [
     "verify",
     "verifying",
     "vertices_shown",
+    "with_facets",
     "with_height_stds",
 ]

@@ -55,6 +55,8 @@ class Reconstruction:
     point_std : its standard deviation along the normal, in units of L; 1 where only contacts show the surface
     converged : whether its solver converged
     taps : what was felt between the curves; None if nobody tapped there
+    shape_curvatures : (n, 2), estimates of the principal curvatures, in order, of the shape that few facets
+        stand for; none where the mesh is fine or unknown
     known_height_std : mean_height_std, if it is known already
     known_curves : the contours as Curves of one touch, in the world, if they are known already
 
@@ -72,6 +74,7 @@ class Reconstruction:
     converged: bool = True
     strokes: Array = field(default_factory=lambda: np.empty((0, 3)))
     taps: Taps | None = None
+    shape_curvatures: Array = field(default_factory=lambda: np.empty((0, 2)))
     known_height_std: float | None = None
     known_curves: Curves | None = None
 
@@ -231,7 +234,14 @@ class Reconstruction:
         if self.method != "bayes":
             off = posterior.polynomial[2:FREE] - coefficients_of(self.patch.scaled(1.0 / self.radius))[2:FREE]
             found = found + np.outer(off, off)
-        return found + self.bends.covariance
+        # One deviation in each direction: that of the coefficient of xy is larger by the square root of 2.
+        facets = (0.5 * self.radius * self._off_shape.max(initial=0.0)) ** 2 * np.diag([1.0, 2.0, 1.0])
+        return found + self.bends.covariance + facets
+
+    @property
+    def _off_shape(self) -> Array:
+        """How far principal curvatures are off each estimate of those of the shape, (n,)."""
+        return np.abs(np.sort([self.k1, self.k2]) - self.shape_curvatures).max(axis=1)
 
     @cached_property
     def bends(self) -> Bends:
@@ -334,6 +344,7 @@ class Reconstruction:
             contours=tuple(contour.moved(scale, turn, start, end) for contour in self.contours),
             strokes=end + scale * (self.strokes - start) @ turn.T,
             point=end,
+            shape_curvatures=self.shape_curvatures / scale,
             known_height_std=None,
             known_curves=None,
         )
@@ -362,6 +373,7 @@ class Reconstruction:
     def _doubting(self) -> Iterator[Doubt]:
         """Reasons to doubt it, the gravest first."""
         useless, radius = status.useless(self.method, self.contours), self.radius
+        yield from status.about_facets(self._off_shape, self.shape_curvatures)
         stops = stops_at(self.contours, self.frame.origin, AT_POINT * radius)
         yield from status.about_taps(self.taps, any(stop in SURFACE_ENDS for stop in stops), useless)
         if not self.converged:

@@ -58,6 +58,7 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
         "strokes": r.strokes.tolist() if len(r.strokes) else None,
         "posterior": posterior and _posterior_dict(posterior),
         "taps": None if r.taps is None else r.taps._asdict(),
+        "shape_curvatures": r.shape_curvatures.tolist(),
     }
 
 
@@ -99,6 +100,9 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
         converged=_converged(_of(d, "converged")),
         strokes=np.empty((0, 3)) if strokes is None else finite_array("strokes", strokes, (None, 3), LARGEST),
         taps=_taps(d.get("taps")),
+        shape_curvatures=finite_array(
+            "shape_curvatures", _of(d, "shape_curvatures") or np.empty((0, 2)), (None, 2), LARGEST
+        ),
         known_height_std=number("mean_height_std", _of(d, "mean_height_std"), least=0.0),
     )
     places = {f"contours[{i}]": contour.points for i, contour in enumerate(r.contours)}

@@ -39,6 +39,9 @@ CONTRADICTING = 2.0  # Mean number of deviations by which the surface is off the
 FLAT = 0.5  # A point is on a flat face if more than this share of the contacts, those around it,
 FLAT_COSINE = math.cos(math.radians(0.5))  # have its normal, to half a degree. Its curvature is then below
 BENT, BENT_DEVIATIONS = 0.02, 3.0  # this share of 1 / radius, or this many deviations (tests of core.scan).
+# The curvature is that of facets if it is off all estimates of the shape's by this share of the larger one,
+# and by this multiple of what estimates are apart (benchmarks.facets: standard models).
+OFF_SHAPE, DISAGREEING = 0.2, 1.5
 DOUBTFUL_GAP = 0.04  # Share of the area that has no surface: near a straight edge it may be 0.03.
 
 
@@ -80,6 +83,18 @@ def about_taps(taps: Taps | None, is_at_edge: bool, useless: tuple[str, ...]) ->
         yield Doubt("near_edge", taps.missed)
     if taps.missing > DOUBTFUL_GAP:
         yield Doubt("gap", taps.missing, DOUBTFUL_GAP, useless=useless)
+
+
+def about_facets(off: Array, shape: Array) -> Iterator[Doubt]:
+    """Whether few facets have other principal curvatures than the shape that they stand for.
+
+    off : (n,), how far those found are off estimates of the shape's; shape : (n, 2), these
+    """
+    if not len(shape):
+        return
+    largest, apart = float(np.abs(shape).max()), float(np.ptp(shape, axis=0).max())
+    if off.min() > max(OFF_SHAPE * largest, DISAGREEING * apart):
+        yield Doubt("facets", float(off.max()) / largest, OFF_SHAPE)
 
 
 def about_point(

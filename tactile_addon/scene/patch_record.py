@@ -113,7 +113,7 @@ def mark_outdated(patch: Object, message: str) -> None:
     if report is None:
         return
     if VERDICT not in patch:
-        patch[VERDICT] = {key: report[key] for key in ("status", "message")}
+        patch[VERDICT] = {key: report[key] for key in ("status", "message", "doubts")}
     report.update({"status": "outdated", "message": message})
 
 

@@ -45,7 +45,7 @@ from .rows import draw_rows, draw_sentence
 TAB = "Tactile"
 HELP = "Click on a mesh: a probe feels its surface there and keeps a patch of it with its curvatures"
 OTHER_MODE = "Objects are touched in Object Mode, so the buttons are gray"
-ICONS = {"ok": "CHECKMARK", "uncertain": "ERROR", "not_converged": "ERROR"}
+ICONS = {"ok": "CHECKMARK"}
 
 
 class _Sidebar(PanelMixin):
@@ -178,7 +178,7 @@ def _draw_remedy(layout: bpy.types.UILayout, record: Mapping[str, Any]) -> None:
     """Draws the button that helps a probe's patch which is outdated, or felt few facets."""
     if record["status"] == "outdated":
         layout.operator(TACTILE_OT_update.bl_idname, icon="FILE_REFRESH")
-    elif record.get("few_facets"):
+    elif any(doubt["code"] == "facets" for doubt in record["doubts"]):
         layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
 
 

@@ -65,11 +65,8 @@ def verdict(report: TouchReport, unit: Unit) -> str:
     """A sentence on whether a patch is good, and what to do if it is not."""
     if report["status"] == "outdated":
         return "Outdated: touch again"
-    if report.get("few_facets"):
-        return "Curvature of the facet, not of the shape"
-    if report["status"] != "ok":
-        doubt = report["message"].partition(". ")[0].rstrip(".")
-        return f"Doubtful: {doubt.rpartition(': ')[2]}"
+    if report["doubts"]:
+        return f"Doubtful: {report['doubts'][0]['advice']}"
     stops = Counter(stop for pair in report.get("stops", ()) for stop in pair)
     ends = ((count, core.WHERE.get(stop, "")) for stop, count in stops.most_common())
     early = [(count, where) for count, where in ends if where.endswith(EARLY)]
