@@ -54,7 +54,7 @@ REASONS = {
     ),
     "steps": Reason(
         "The minimization stopped at its step limit, and the patch is the best so far",
-        ("use the fast solver", "use a smaller weight"),
+        ("use the fast solver or a smaller weight",),
     ),
     "condition": Reason(
         "The contacts alone do not determine the surface between the curves (condition number {value:.1e})",
@@ -96,8 +96,8 @@ REASONS = {
         (SHORTER, LONGER, FROM_EDGE, PLANES),
     ),
     "curve": Reason(
-        "A curve is {percent:.2g} % of the radius off what the others show, as if it were flipped or its "
-        "plane were another",
+        "A curve is {percent:.2g} % of the radius off what the others show, whose deviations explain "
+        "{percent_limit:.2g} %, as if it were flipped or its plane were another",
         ("check each curve",),
     ),
     "waves": Reason(

@@ -186,9 +186,8 @@ class Atlas:
     @property
     def message(self) -> str:
         """The gravest doubt in a sentence with advice, or that there is none."""
-        if self._gravest is not None:
-            return str(self._gravest)
-        return self.agreement or "The object was felt everywhere a finger could reach."
+        message = "The object was felt everywhere a finger could reach."
+        return self.agreement or message if self._gravest is None else str(self._gravest)
 
     @cached_property
     def doubts(self) -> tuple[Doubt, ...]:

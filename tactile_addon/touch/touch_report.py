@@ -146,7 +146,7 @@ def judgment(result: core.Reconstruction, error: core.MeshError, ended: str) -> 
 
 
 def verdict_report(doubts: Sequence[core.Doubt], message: str) -> TouchReport:
-    """The verdict of a report with these doubts, the gravest first; the message is for where there is none."""
+    """The verdict with these doubts, the gravest first; the message is for where there is none."""
     return {
         "status": core.status_of(next(iter(doubts), None)),
         "message": str(doubts[0]) if doubts else message,

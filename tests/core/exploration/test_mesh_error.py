@@ -176,7 +176,7 @@ def test_a_patch_is_in_doubt_where_there_is_no_mesh(flat):
     (doubt,) = core.doubts_by_mesh(flat, error)
     assert str(doubt) == (
         f"At {100.0 * error.missing:.0f} % of the patch there is no surface, which ends or has a hole "
-        "between the curves: use a shorter extent or add sampling planes.",
+        "between the curves: use a shorter extent or add sampling planes."
     )
 
 
