@@ -26,7 +26,7 @@ def main_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
         ("κ2", _measured(record, "k2", -1, unit)),
         ("Height", f"± {units.say(record['height_std'], 1, unit)}"),
         ("At the Rim", "…" if rim is None else f"± {units.say(rim, 1, unit)}"),
-        ("Misfit", misfit),
+        ("Off the Mesh", misfit),
     ]
 
 
@@ -38,7 +38,7 @@ def other_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
         ("H Mean", _measured(record, "mean_curvature", -1, unit)),
         ("Shape Index", _shape_index(record)),
         ("Curvedness", _said(record, "curvedness", -1, unit)),
-        ("Fit Error", _said(record, "fit_error", 1, unit)),
+        ("Off the Contacts", _said(record, "fit_error", 1, unit)),
     ]
     if record["is_verified"] and record["vertices"]:
         rows.append(("Farthest", _said(record, "vertex_distance_max", 1, unit)))

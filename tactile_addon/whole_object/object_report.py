@@ -124,7 +124,7 @@ def object_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("Patches", record["patches"]),
         ("Edge Length", _edge(record)),
         ("Vertices", record["vertices"]),
-        ("… No Curvature", record.get("unknown_curvatures") or None),
+        ("Without Curvature", record.get("unknown_curvatures") or None),
     )
 
 

@@ -178,7 +178,7 @@ class ObjectTouches:
         if state.joining is None:
             self._is_joining = False
             # The last touches may still end when it is stopped.
-            goes_on = f"{touches}, goes on at {places}" if state.uncovered else touches
+            goes_on = f"{touches}, {places} left" if state.uncovered else touches
             self.words = f"Joining {patches}" if self.is_stopped else goes_on
         else:
             self._rounds += not self._is_joining

@@ -186,14 +186,14 @@ def test_every_row_says_what_it_is(said, extension, ball):
     addon = extension.tactile_addon
     rows = said.main_rows(report, UNIT) + said.other_rows(report, UNIT) + said.plane_rows(report, UNIT)
     labels = [label for label, value in rows if value] + [
-        "Error on 9 More",
-        "Total |K|",
+        "Off 9 More Curves",
+        "Total Curvature",
         "Expected Accuracy with It",
     ]
     assert not [
         label for label in labels if not re.match(r"[A-Z1\d].{15,}", addon.sidebar.rows.tip_of(label))
     ]
-    assert addon.sidebar.rows.tip_of("Error on 9 More") != addon.sidebar.rows.tip_of("Error on Curves")
+    assert addon.sidebar.rows.tip_of("Off 9 More Curves") != addon.sidebar.rows.tip_of("Off the Contacts")
 
 
 @pytest.mark.long

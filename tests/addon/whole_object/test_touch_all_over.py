@@ -76,7 +76,7 @@ def test_near_the_edges_of_a_cube_curvatures_are_unknown_and_colors_those_of_the
     assert np.abs(values(mesh, "mean_curvature")).max() < 0.01
     assert record["unknown_curvatures"] == unknown.sum() > 0
     rows = dict(extension.tactile_addon.whole_object.object_report.object_rows(record))
-    assert rows["… No Curvature"] == str(unknown.sum())
+    assert rows["Without Curvature"] == str(unknown.sum())
     for shown in ("mean_curvature", "curvedness", "height_std"):
         surface.tactile_colors = shown
         colors = mesh.attributes["curvature_color"]

@@ -263,7 +263,7 @@ def test_closed_is_the_mesh_that_is_shown(extension, left_out, shown, uncovered,
     assert report["message"] == words
     rows = extension.tactile_addon.whole_object.object_report.object_rows
     shown_rows = dict(rows(report | {"tolerance": 0.1, "uncovered": len(uncovered)}))
-    assert shown_rows["… No Curvature"] == "1"
+    assert shown_rows["Without Curvature"] == "1"
     assert shown_rows["Surface"] == ("Closed" if is_closed else "Incomplete" if uncovered else "Open")
 
 
@@ -288,7 +288,7 @@ def progress_of(touches, core):
             left = left[~core.covered_by(r, rim, left, touches.tolerance)]
         count = len(touches.found)
         steps.append((touches.words.split()[0], touches.share, 1.0 - len(left) / 1000))
-        assert "goes on at 0" not in touches.words
+        assert "0 places left" not in touches.words
     words, shares, felt = zip(*steps, strict=True)
     touching = words.index("Meshing")
     assert (np.array(shares[:touching]) <= 0.8 * np.array(felt[:touching]) + 1e-9).all()
