@@ -129,8 +129,8 @@ def test_a_patch_on_facets_names_them_and_the_modifier(empty, monkey):
     report = made(empty.ops.tactile.reconstruct, target="Suzanne", location=(0.25, -0.55, 0.75))[1]
     assert report["vertices"] < 6
     assert re.match(
-        r"The facets here make ± \d+ % of the curvature, which is that of the facets, not of the shape: add a "
-        "Subdivision modifier if the mesh stands for a smooth shape.",
+        r"The facets here make ± \d+ % of the curvature, which is that of the facets, not of the shape: "
+        "add a Subdivision modifier if the mesh stands for a smooth shape.",
         report["message"],
     )
     assert (report["status"], is_of_facets(report)) == ("uncertain", True)
