@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import Array
+from ..arguments import SMALLEST, Array
 from ..patch.differential_geometry import Derivatives
 from ..reconstruction.result import Reconstruction
 
@@ -25,10 +25,9 @@ BEND = math.radians(40.0)
 TURNS = np.radians([0.0, 20.0, 40.0])  # The curves, turned by these around the normal, show where facets are.
 # Edges between these angles stand for a smooth bend,
 DISTINCT_COSINE, SMOOTH_COSINE = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))
-# if both facets have this share of the wider one's width across it, and of the radius; else one is a fillet.
+# if both facets have this share of the wider one's width across it; else one is a fillet. Facets are fine if
+# that at the point is narrower than this share of the radius.
 MIN_WIDTH_RATIO = 0.25
-# On fewer facets than this, of different normals, half of the radius suffices: a touch along a cone is long.
-FEW, PARALLEL_COSINE = 8, math.cos(math.radians(0.1))
 NEIGHBOR_STEP = 0.05  # The facet behind an edge is looked for this share of the width beyond it.
 
 
@@ -49,8 +48,8 @@ def with_facets(
 ) -> Reconstruction:
     """The reconstruction, with curvatures as uncertain as facets leave those of the shape they stand for.
 
-    It is the same on a fine mesh, where contacts lie on many facets that are narrow compared with the radius,
-    and on a facet whose edges are all sharp or those of fillets, as that of a cube: this is the shape itself.
+    It is the same on a fine mesh, whose facets are narrow compared with the radius. A facet whose edges are
+    all sharp or those of fillets, as that of a cube, is the shape itself.
 
     face_near : the number of the face nearest to a point (3,) of the world
     corners_of : the corners (k, 3) of a face in the world, in order
@@ -69,19 +68,11 @@ def _shape_curvatures(
         """The face nearest to a point (3,)."""
         return shape(face_near(at))
 
-    here, radius = facet_near(r.frame.origin), r.radius
-    width = _width(here, facet_near)
-    felt = set(map(face_near, np.vstack([contour.points for contour in r.contours])))
-    if width < MIN_WIDTH_RATIO * radius:
-        if not (width and _are_few(map(shape, felt))):
-            return []
-        radius *= 0.5
-    if any(_bends(here, facet_near)) and not _is_smooth(here, 0.0, facet_near):
-        return []  # Its bends are those of fillets.
-    points, wide = _around(r, TURNING * width), max(width, radius)
-    faces = [face_near(point) for point in points]
-    if not any(_is_smooth(facet, wide, facet_near) for facet in map(shape, set(faces))):
+    width = _smooth_width(facet_near(r.frame.origin), facet_near)
+    if width < max(MIN_WIDTH_RATIO * r.radius, SMALLEST):
         return []
+    points = _around(r, TURNING * width)
+    faces = [face_near(point) for point in points]
     within = [set(map(face_near, _around(r, share * width))) for share in CORNERS]
     by_corners = [_of_corners(r, map(shape, some)) for some in within]
     turning = _turning(r, points, [shape(face) for face in faces])
@@ -95,8 +86,12 @@ def is_beside_bend(
 
     The arguments are those of `with_facets`.
     """
-    facet = _facet(corners_of(face_near(point)))
-    return _is_smooth(facet, 0.0, lambda at: _facet(corners_of(face_near(at))))
+
+    def facet_near(at: Array) -> Facet:
+        """The face nearest to a point (3,)."""
+        return _facet(corners_of(face_near(at)))
+
+    return _smooth_width(facet_near(point), facet_near) > 0.0
 
 
 def _around(r: Reconstruction, reach: float) -> Array:
@@ -109,17 +104,6 @@ def _around(r: Reconstruction, reach: float) -> Array:
     x, y, z = reach / r.radius * r.frame.to_local(points).T
     turned = [(x * c - y * s, x * s + y * c, z) for c, s in zip(np.cos(TURNS), np.sin(TURNS), strict=True)]
     return r.frame.to_world(np.concatenate(turned, axis=1).T)
-
-
-def _are_few(facets: Iterable[Facet]) -> bool:
-    """Whether facets have fewer than FEW different normals."""
-    normals: list[Array] = []
-    for facet in facets:
-        if all(facet.normal @ normal < PARALLEL_COSINE for normal in normals):
-            normals.append(facet.normal)
-        if len(normals) == FEW:
-            return False
-    return True
 
 
 def _turning(r: Reconstruction, points: Array, facets: list[Facet]) -> Array:
@@ -155,11 +139,13 @@ def _of_corners(r: Reconstruction, facets: Iterable[Facet]) -> Array | None:
     return np.array(fitted.principal_curvatures) / r.radius
 
 
-def _width(facet: Facet, facet_near: Callable[[Array], Facet]) -> float:
-    """The largest width of a facet across its smooth bends, or if it has none across its longest edge."""
-    edges = np.roll(facet.corners, -1, axis=0) - facet.corners
-    longest = edges[np.argmax((edges**2).sum(axis=1))]
-    return max(map(min, _bends(facet, facet_near)), default=facet.width(longest))
+def _smooth_width(facet: Facet, facet_near: Callable[[Array], Facet]) -> float:
+    """The largest width of a facet across an edge that stands for a smooth bend, or 0 if none does.
+
+    An edge to a facet that is much narrower, or wider, is one of a fillet.
+    """
+    bends = _bends(facet, facet_near)
+    return max((min(widths) for widths in bends if min(widths) >= MIN_WIDTH_RATIO * max(widths)), default=0.0)
 
 
 def _bends(facet: Facet, facet_near: Callable[[Array], Facet]) -> Iterator[tuple[float, float]]:
@@ -173,11 +159,6 @@ def _bends(facet: Facet, facet_near: Callable[[Array], Facet]) -> Iterator[tuple
         beyond = facet_near(start + 0.5 * edge + NEIGHBOR_STEP * width * out / np.linalg.norm(out))
         if SMOOTH_COSINE < float(facet.normal @ beyond.normal) < DISTINCT_COSINE:
             yield width, beyond.width(edge)
-
-
-def _is_smooth(facet: Facet, radius: float, facet_near: Callable[[Array], Facet]) -> bool:
-    """Whether an edge of the facet stands for a smooth bend."""
-    return any(min(widths) >= MIN_WIDTH_RATIO * max(*widths, radius) for widths in _bends(facet, facet_near))
 
 
 def _facet(corners: ArrayLike) -> Facet:
