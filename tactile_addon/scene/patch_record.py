@@ -52,6 +52,7 @@ def report_of(patch: Object) -> TouchReport | None:
         frame = np.array([report["frame"][name] for name in ("origin", "d1", "d2", "normal")], dtype=float)
         numbers = [float(report[name]) for name in ("radius", "height_std", "k1", "k2")]
         words = [report[name] for name in ("source", "status", "message", "ended")]
+        words += [doubt[name] for doubt in report["doubts"] for name in ("code", "sentence", "advice")]
         report["is_verified"]
     except (KeyError, TypeError, ValueError, AttributeError):
         return None
