@@ -76,8 +76,8 @@ def agreement(record: Mapping[str, Any]) -> str | None:
     unit, tolerance = unit_of(record), record["tolerance"]
     share = within(record["within"], record["deviation_max"] <= tolerance)
     return (
-        f"{share} of the surface is within the tolerance of {units.say(tolerance, 1, unit)}, and the farthest "
-        f"place is {deviation(record, 'max')} off. "
+        f"{share} of the surface is within the tolerance of {units.say(tolerance, 1, unit)}, and the "
+        f"farthest place is {deviation(record, 'max')} off. "
         f"Good means at least {100.0 * WITHIN_SHARE:g} % within it, and none farther off than "
         f"{units.say(OFF_TOLERANCES * tolerance, 1, unit)}."
     )
