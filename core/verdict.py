@@ -33,12 +33,12 @@ class Reason(NamedTuple):
 
 REASONS = {
     # A touch, the gravest first.
+    "at_edge": Reason("The point is {0}, so half curves end there at once", (FROM_EDGE, FINER_FACETS)),
     "facets": Reason(
         "The facets here make ± {percent:.0f} % of the curvature, which is that of the facets, not of the "
         "shape",
         ("add a Subdivision modifier if the mesh stands for a smooth shape",),
     ),
-    "at_edge": Reason("The point is {0}, so half curves end there at once", (FROM_EDGE,)),
     "taps": Reason(
         "Between the curves the surface is up to {percent:.2g} % of the radius off the patch, perhaps at an "
         "edge or a pocket that no curve crosses",

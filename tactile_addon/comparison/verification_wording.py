@@ -77,8 +77,8 @@ def verification_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, 
     """(label, value) of everything else that a verification has found."""
     found = record["verification"]
     return [
-        ("Off the Contacts", _length(record, "fit_error", unit)),
-        (f"Off {found['extra_contours']} More Curves", _length(record, "extra_fit_error", unit)),
+        ("Fit Error", _length(record, "fit_error", unit)),
+        (f"Error on {found['extra_contours']} More Curves", _length(record, "extra_fit_error", unit)),
         ("Total Curvature", f"{found['total_absolute_curvature']:.3g}"),
         ("Overlap", f"{100.0 * found['overlap']:.0f} %"),
         ("Largest Deviation", _length(record, "patch_distance_max", unit)),

@@ -43,6 +43,7 @@ from .patch_rows import found_values, main_rows, other_rows, plane_rows
 from .rows import draw_rows, draw_sentence
 
 TAB = "Tactile"
+FACETED = {"at_edge", "facets", "kink", "folds"}  # Finer facets may take these doubts away.
 HELP = "Click on a mesh: a probe feels its surface there and keeps a patch of it with its curvatures"
 OTHER_MODE = "Objects are touched in Object Mode, so the buttons are gray"
 ICONS = {"ok": "CHECKMARK"}
@@ -178,7 +179,7 @@ def _draw_remedy(layout: bpy.types.UILayout, record: Mapping[str, Any]) -> None:
     """Draws the button that helps a probe's patch which is outdated, or felt few facets."""
     if record["status"] == "outdated":
         layout.operator(TACTILE_OT_update.bl_idname, icon="FILE_REFRESH")
-    elif any(doubt["code"] == "facets" for doubt in record["doubts"]):
+    elif FACETED.intersection(doubt["code"] for doubt in record["doubts"]):
         layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
 
 

@@ -38,7 +38,7 @@ def other_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
         ("H Mean", _measured(record, "mean_curvature", -1, unit)),
         ("Shape Index", _shape_index(record)),
         ("Curvedness", _said(record, "curvedness", -1, unit)),
-        ("Off the Contacts", _said(record, "fit_error", 1, unit)),
+        ("Fit Error", _said(record, "fit_error", 1, unit)),
     ]
     if record["is_verified"] and record["vertices"]:
         rows.append(("Farthest", _said(record, "vertex_distance_max", 1, unit)))
