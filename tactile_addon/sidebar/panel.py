@@ -43,7 +43,7 @@ from .patch_rows import found_values, main_rows, other_rows, plane_rows
 from .rows import draw_rows, draw_sentence
 
 TAB = "Tactile"
-FACETED = {"at_edge", "facets", "kink", "folds"}  # Finer facets may take these doubts away.
+FACETED = {"facets", "folds"}  # A Subdivision modifier may take these doubts away.
 HELP = "Click on a mesh: a probe feels its surface there and keeps a patch of it with its curvatures"
 OTHER_MODE = "Objects are touched in Object Mode, so the buttons are gray"
 ICONS = {"ok": "CHECKMARK"}

@@ -26,7 +26,7 @@ def main_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
         ("κ2", _measured(record, "k2", -1, unit)),
         ("Height", f"± {units.say(record['height_std'], 1, unit)}"),
         ("At the Rim", "…" if rim is None else f"± {units.say(rim, 1, unit)}"),
-        ("Off the Mesh", misfit),
+        ("Deviation", misfit),
     ]
 
 

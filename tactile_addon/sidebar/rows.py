@@ -45,7 +45,7 @@ TIPS = {
     "Surface": "Closed: felt all round; Open: the object ends there; Incomplete: touches could go on",
     "Goes On At": "Number of places where nothing was felt yet, although the object goes on there",
     "Tolerance": "Standard deviation to reach for the height of each patch",
-    "Off the Mesh": "Mean distance from the mesh, that of a patch in height; – if no mesh is below",
+    "Deviation": "Mean distance from the mesh, that of a patch in height; – if no mesh is below",
     "Edge Length": "Typical length of the surface's edges, at most about a quarter of the thinnest wall",
     "Vertices": "Number of vertices of the surface",
     "Points": "Number of points of the mesh that were touched",

@@ -118,7 +118,7 @@ def object_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("Tolerance", _tolerance(record)),
         ("Height", f"± {units.say(record['height_std'], 1, unit_of(record))}"),
         # Where touches could go on, most of it would be the object that was not felt.
-        ("Off the Mesh", None if record.get("uncovered") else deviation(record, "mean")),
+        ("Deviation", None if record.get("uncovered") else deviation(record, "mean")),
         ("Patches", record["patches"]),
         ("Edge Length", _edge(record)),
         ("Vertices", record["vertices"]),

@@ -181,7 +181,7 @@ def test_rows_are_distinguished_by_how_they_begin(said, ball):
     rows = said.main_rows(report, UNIT) + said.other_rows(report, UNIT)
     labels = [label for label, value in rows if value]  # a heading has no value
     assert len({label[:5] for label in labels}) == len(labels) == len(set(labels))
-    assert max(map(len, labels)) <= 12
+    assert max(map(len, labels)) <= 11
 
 
 def test_every_row_says_what_it_is(said, extension, ball):

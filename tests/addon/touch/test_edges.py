@@ -129,8 +129,8 @@ def test_a_patch_on_facets_names_them_and_the_modifier(empty, monkey):
     report = made(empty.ops.tactile.reconstruct, target="Suzanne", location=(0.25, -0.55, 0.75))[1]
     assert report["vertices"] < 6
     assert report["message"] == (
-        "The point is at a crease, so half curves end there at once: move the point away from the edge or make "
-        "the facets finer."
+        "The point is at a crease, so half curves end there at once: move the point away from the edge or "
+        "make the facets finer."
     )
     assert report["status"] == "uncertain"
     modifier = monkey.modifiers.new("Subdivision", "SUBSURF")

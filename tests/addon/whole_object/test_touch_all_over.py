@@ -143,7 +143,7 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball, extension):
     assert report.object_verdict(record).startswith("Incomplete. The patches end at ")
     assert "allow more touches" in record["message"]
     assert report.object_summary(record) == f"Incomplete: 3 touches; the object goes on at {places}"
-    assert "Off the Mesh" not in rows  # Most of it would be what was not felt.
+    assert "Deviation" not in rows  # Most of it would be what was not felt.
 
 
 def faces_of(bpy, vertices, faces):

@@ -55,7 +55,7 @@ def test_a_cube_is_a_cube_with_sharp_edges(empty, extension):
     rule = "Good means at least 99 % within it, and none farther off than 1.2 cm."
     assert report.object_verdict(record) == f"Good. {OK} {agreement} {rule}"
     assert report.is_all_within(record)
-    assert dict(report.object_rows(record))["Off the Mesh"] == "0 cm"
+    assert dict(report.object_rows(record))["Deviation"] == "0 cm"
     # What is farther off than that is in the message already.
     far = {**record, "deviation_max": 0.05, "within": 0.9}
     words = (
