@@ -7,7 +7,7 @@ docs/messages.md of them.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -231,6 +231,12 @@ class Doubt:
             "sentence": self.sentence,
             "advice": self.advice,
         }
+
+
+def beyond(code: str, value: float, limit: float, useless: tuple[str, ...] = ()) -> Iterator[Doubt]:
+    """The doubt of this code, if the value is beyond the limit."""
+    if value > limit:
+        yield Doubt(code, value, limit, useless=useless)
 
 
 def joined(advice: Sequence[str]) -> str:

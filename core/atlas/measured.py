@@ -20,7 +20,7 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.start import TOUCH_ROUNDING, too_coarse
 from ..steps import chunked, part_of, result_of
 from ..triangles import row_dot
-from ..verdict import Doubt
+from ..verdict import Doubt, beyond
 from .charts import AZIMUTHS, Charts
 from .connectivity import connected_pieces
 from .finger import FACING
@@ -221,8 +221,7 @@ def _off_surface(
 
 def _doubts_of_surface(atlas: Atlas, noise: float, most: float) -> Iterator[Doubt]:
     """Whether contacts scatter by a noise above `most`, or surround a cavity."""
-    if noise > most:
-        yield Doubt("noise", noise, most)
+    yield from beyond("noise", noise, most)
     if not atlas.uncovered and atlas.reference.indicator.values[0, 0, 0] > 0.0:  # It is inside there.
         yield Doubt("cavity")
 

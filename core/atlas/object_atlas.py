@@ -16,7 +16,7 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
 from ..steps import chunked, result_of
 from ..triangles import LEAST_DIVISOR, triangle_cross
-from ..verdict import FINER, TOUCHES, Doubt, status_of
+from ..verdict import FINER, TOUCHES, Doubt, beyond, status_of
 from .borders import Border, snapped_to_border
 from .boundaries import Edge, edges_of, gaussian_curvature_of, node_dict
 from .charts import Charts
@@ -208,8 +208,7 @@ class Atlas:
         inside = self.reference.indicator
         if inside.thinnest < THIN * inside.resolved:
             yield Doubt("thin", inside.thinnest / inside.size, inside.resolved / inside.size)
-        if self.is_rough:
-            yield Doubt("rough", self._rough[0], ROUGH)
+        yield from beyond("rough", self._rough[0], ROUGH)
         wrong = int(self.contradicting.sum()) + len(self.check.missed)
         if wrong:
             rays = (str(len(self.check.points) + len(self.check.missed)),)

@@ -12,7 +12,7 @@ from ..contours.contour import Vector, along, dot, scaled, vector_of
 from ..contours.finger import Surface, contact_of
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import CONTRADICTING, DOUBTFUL_GAP, useless
-from ..verdict import OK, Doubt
+from ..verdict import OK, Doubt, beyond
 
 # benchmarks.refusals counts the patches that are off, but ok.
 MESH_LAYERS = 8  # A sample is compared with no more layers of the mesh above and below it,
@@ -65,9 +65,11 @@ def doubts_by_mesh(r: Reconstruction, error: MeshError) -> tuple[Doubt, ...]:
     mean, most = error.height or 0.0, CONTRADICTING * r.mean_height_std
     if r.status != OK:
         return r.doubts
-    if error.missing > DOUBTFUL_GAP:
-        return (Doubt("gap", error.missing, DOUBTFUL_GAP, useless=useless(r.method, r.contours)),)
-    return (Doubt("mesh", mean / r.radius, most / r.radius),) if mean > most else ()
+    tried = useless(r.method, r.contours)
+    return (
+        *beyond("gap", error.missing, DOUBTFUL_GAP, tried),
+        *beyond("mesh", mean / r.radius, most / r.radius, tried),
+    )
 
 
 def layer_height(

@@ -32,7 +32,7 @@ from ..patch.domain import AT_POINT, Domain
 from ..patch.geometry import Geometry, similarity, total_absolute_curvature
 from ..patch.monge import MongePatch, exponents, monomials
 from ..patch.triangulation import patch_mesh
-from ..verdict import Doubt, status_of
+from ..verdict import Doubt, beyond, status_of
 from . import status
 from .status import Taps
 
@@ -80,7 +80,8 @@ class Reconstruction:
 
     def __post_init__(self) -> None:
         copies = tuple(contour.copied() for contour in self.contours)
-        vars(self).update(contours=copies, strokes=read_only(self.strokes), point=read_only(self.point))
+        arrays = {name: read_only(getattr(self, name)) for name in ("strokes", "point", "shape_curvatures")}
+        vars(self).update(contours=copies, **arrays)
 
     def __repr__(self) -> str:
         point = ", ".join(f"{x:.4g}" for x in self.frame.origin)
@@ -378,18 +379,14 @@ class Reconstruction:
         yield from status.about_taps(self.taps, any(stop in SURFACE_ENDS for stop in stops), useless)
         if not self.converged:
             yield Doubt("steps")
-        if self.method == "least-squares" and self.condition_number > status.DOUBTFUL_CONDITION:
-            yield Doubt("condition", self.condition_number, status.DOUBTFUL_CONDITION)
+        if self.method == "least-squares":
+            yield from beyond("condition", self.condition_number, status.DOUBTFUL_CONDITION)
         yield from status.about_point(
             self.misses, self.noise, self.point_std, self.contours, self.point, radius
         )
         yield from status.about_normals(self.contradiction, self.normal_scatter)
-        missed, most = self.typical_miss / radius, status.DOUBTFUL_FIT + self.noise
-        if missed > most:
-            yield Doubt("contacts", missed, most, useless=useless)
-        share = self.mean_height_std / radius
-        if share > status.DOUBTFUL_STD:
-            yield Doubt("heights", share, status.DOUBTFUL_STD, useless=useless)
+        yield from beyond("contacts", self.typical_miss / radius, status.DOUBTFUL_FIT + self.noise, useless)
+        yield from beyond("heights", self.mean_height_std / radius, status.DOUBTFUL_STD, useless)
         yield from status.about_frame(self.posterior, self.contours, useless)
         yield from self._doubting_shape(useless)
 
@@ -398,16 +395,13 @@ class Reconstruction:
         deviations, off = self.curve_contradiction
         if deviations > status.CONTRADICTING_CURVE:
             yield Doubt("curve", off, status.CONTRADICTING_CURVE * off / deviations)
-        waves = self.waves / self.radius
-        if waves > status.DOUBTFUL_WAVES and not len(self.strokes):
-            yield Doubt("waves", waves, status.DOUBTFUL_WAVES, useless=useless)
+        if not len(self.strokes):
+            yield from beyond("waves", self.waves / self.radius, status.DOUBTFUL_WAVES, useless)
         bent, std = self.radius * max(abs(self.k1), abs(self.k2)), self.posterior.curvature_std()
         if status.is_on_flat_face(bent, std, self.contours, self.frame.origin):
             yield Doubt("flat_face", bent, std, useless=useless)
-        if self.bends.folded > status.DOUBTFUL_FOLD:
-            yield Doubt("folds", self.bends.folded, status.DOUBTFUL_FOLD, useless=useless)
-        if self.curvature_contradiction > status.SIGNIFICANT:
-            yield Doubt("bend", self.curvature_contradiction, status.SIGNIFICANT, useless=useless)
+        yield from beyond("folds", self.bends.folded, status.DOUBTFUL_FOLD, useless)
+        yield from beyond("bend", self.curvature_contradiction, status.SIGNIFICANT, useless)
 
     @property
     def _notes(self) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from ..arguments import Array
 from ..bayes.posterior import CONFIDENCE, SurfacePosterior
 from ..contours.contour import SURFACE_ENDS, UNEXPLAINED, Contour, unit_normals
-from ..verdict import FROM_EDGE, LONGER, SHORTER, Doubt
+from ..verdict import FROM_EDGE, LONGER, SHORTER, Doubt, beyond
 
 # benchmarks.stability chose these, and benchmarks.real LIKELY and those of taps. A fit is in doubt beyond
 # them.
@@ -77,12 +77,10 @@ def about_taps(taps: Taps | None, is_at_edge: bool, useless: tuple[str, ...]) ->
     """Whether taps contradict the fit; the surface may end at the point, as a half curve shows."""
     if taps is None:
         return
-    if taps.off:
-        yield Doubt("taps", taps.off, useless=useless)
+    yield from beyond("taps", taps.off, 0.0, useless)
     if taps.missed and is_at_edge:
         yield Doubt("near_edge", taps.missed)
-    if taps.missing > DOUBTFUL_GAP:
-        yield Doubt("gap", taps.missing, DOUBTFUL_GAP, useless=useless)
+    yield from beyond("gap", taps.missing, DOUBTFUL_GAP, useless)
 
 
 def about_facets(off: Array, shape: Array) -> Iterator[Doubt]:
@@ -144,9 +142,7 @@ def about_frame(
     turn = posterior.turn(LIKELY if posterior.amplitude else CONFIDENCE)
     if turn > DOUBTFUL_TURN and not posterior.is_round:
         yield Doubt("directions", turn, DOUBTFUL_TURN, useless=useless)
-    std = posterior.curvature_std()
-    if std > DOUBTFUL_CURVATURE:
-        yield Doubt("curvatures", std, DOUBTFUL_CURVATURE, useless=useless)
+    yield from beyond("curvatures", posterior.curvature_std(), DOUBTFUL_CURVATURE, useless)
 
 
 def is_on_flat_face(bent: float, std: float, contours: Sequence[Contour], origin: Array) -> bool:

@@ -354,6 +354,10 @@ def test_who_stops_it_gets_no_advice_to_allow_more_touches(ball, touches_of):
     report = touches.report()
     places = f"{report['uncovered']} places"
     assert report["message"] == f"Touching was stopped, and the object goes on at {places}: touch it again."
+    again = touches_of(ball, tolerance=0.02)
+    for _ in again.steps():
+        pass
+    assert not again.report()["doubts"]
 
 
 @pytest.mark.long
@@ -366,6 +370,9 @@ def test_there_is_no_tick_where_heights_are_worse_than_the_tolerance(extension, 
     touches.whole.mesh = mesh._replace(std=mesh.std + touches.tolerance)
     report = touches.report()
     assert report["message"].startswith("Heights are accurate to ")
+    assert report["message"].endswith("use a larger tolerance.")
+    touches.tolerance *= 2.0
+    assert "mean_height" not in {doubt["code"] for doubt in touches.report()["doubts"]}
     assert extension.tactile_addon.whole_object.object_report.verdict_of(report) == "Doubtful"
 
 
