@@ -181,13 +181,13 @@ class Atlas:
     @property
     def status(self) -> str:
         """ "ok" or "uncertain"."""
-        return status_of(self._gravest)
+        return status_of(self.gravest)
 
     @property
     def message(self) -> str:
         """The gravest doubt in a sentence with advice, or that there is none."""
         message = "The object was felt everywhere a finger could reach."
-        return self.agreement or message if self._gravest is None else str(self._gravest)
+        return self.agreement or message if self.gravest is None else str(self.gravest)
 
     @cached_property
     def doubts(self) -> tuple[Doubt, ...]:
@@ -195,7 +195,8 @@ class Atlas:
         return tuple(self._doubting())
 
     @cached_property
-    def _gravest(self) -> Doubt | None:
+    def gravest(self) -> Doubt | None:
+        """The gravest doubt, or None."""
         return next(self._doubting(), None)
 
     def _doubting(self) -> Iterator[Doubt]:

@@ -353,12 +353,12 @@ class Reconstruction:
     @property
     def status(self) -> str:
         """ "ok", "uncertain" or "not_converged"."""
-        return status_of(self._gravest)
+        return status_of(self.gravest)
 
     @property
     def message(self) -> str:
         """The gravest doubt in a sentence with advice, and what the contacts leave undetermined."""
-        verdict = "The patch describes its contacts." if self._gravest is None else str(self._gravest)
+        verdict = "The patch describes its contacts." if self.gravest is None else str(self.gravest)
         return f"{verdict}{self._notes}"
 
     @cached_property
@@ -367,7 +367,7 @@ class Reconstruction:
         return tuple(self._doubting())
 
     @cached_property
-    def _gravest(self) -> Doubt | None:
+    def gravest(self) -> Doubt | None:
         """The gravest doubt, or None; the others are not looked for, which would take longer."""
         return next(self._doubting(), None)
 

@@ -184,8 +184,8 @@ class StabilityMap:
 
     def _note(self, number: int, touch: core.Exploration) -> None:
         result = core.with_facets(touch.result, self.surface.face_near, self.surface.corners_of)
-        self.few_facets += any(doubt.code == "facets" for doubt in result.doubts)
-        is_sure = not result.doubts
+        self.few_facets += result.gravest is not None and result.gravest.code == "facets"
+        is_sure = result.gravest is None
         self.reason[number] = REASON_KEYS.index("patch" if is_sure else "doubt")
         self.measures[number] = (
             NOTHING if result.taps.height is None else result.taps.height,

@@ -170,7 +170,8 @@ class ObjectTouches:
             self.rims.append(rim)
             self._area += r.domain.area
             on_mesh = core.with_facets(r, self.surface.face_near, self.surface.corners_of)
-            self._faceted += r.domain.area * any(doubt.code == "facets" for doubt in on_mesh.doubts)
+            is_of_facets = on_mesh.gravest is not None and on_mesh.gravest.code == "facets"
+            self._faceted += r.domain.area * is_of_facets
             self._left = self._left[~core.covered_by(r, rim, self._left, self.tolerance)]
         self.done, self.uncovered = state.done, state.uncovered
         touches, places = many(state.done, "touch", "touches"), many(state.uncovered, "place", "places")
@@ -250,7 +251,10 @@ class ObjectTouches:
         doubts, unit = self.whole.doubts(), unit_of(found)
         if count := found["uncovered"]:
             places = (many(count, "place", "places"),)
-            return [core.Doubt("stopped", count, words=places)] * self._is_cut_short + doubts
+            if not self._is_cut_short:
+                return doubts
+            others = (doubt for doubt in doubts if doubt.code != "cut_short")
+            return [core.Doubt("stopped", count, words=places), *others]
         off, farthest = self.compared.largest, OFF_TOLERANCES * self.tolerance
         useless = (core.FINER,) if self.edge else (core.SHORTER_EDGES,)
         if off > farthest:
