@@ -58,7 +58,7 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
         "strokes": r.strokes.tolist() if len(r.strokes) else None,
         "posterior": posterior and _posterior_dict(posterior),
         "taps": None if r.taps is None else r.taps._asdict(),
-        "shape_curvatures": r.shape_curvatures.tolist(),
+        "shape_curvatures": r.shape_curvatures.tolist() if len(r.shape_curvatures) else None,
     }
 
 
@@ -84,7 +84,8 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
         raise ValueError(
             f"version: expected {VERSION}, got {shown(d['version'])}: this was written by another release"
         )
-    method, strokes, patch = _of(d, "method"), _of(d, "strokes"), _polynomial(_of(d, "patch"))
+    method, strokes, shape = (_of(d, key) for key in ("method", "strokes", "shape_curvatures"))
+    patch = _polynomial(_of(d, "patch"))
     if not isinstance(method, str) or method not in METHODS:
         raise ValueError(f"method: expected one of {', '.join(METHODS)}, got {shown(method)}")
     surface = _posterior(_of(d, "posterior")) if method == "bayes" else None
@@ -100,8 +101,8 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
         converged=_converged(_of(d, "converged")),
         strokes=np.empty((0, 3)) if strokes is None else finite_array("strokes", strokes, (None, 3), LARGEST),
         taps=_taps(d.get("taps")),
-        shape_curvatures=finite_array(
-            "shape_curvatures", _of(d, "shape_curvatures") or np.empty((0, 2)), (None, 2), LARGEST
+        shape_curvatures=(
+            np.empty((0, 2)) if shape is None else finite_array("shape_curvatures", shape, (None, 2), LARGEST)
         ),
         known_height_std=number("mean_height_std", _of(d, "mean_height_std"), least=0.0),
     )
