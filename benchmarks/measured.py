@@ -36,7 +36,7 @@ from time import process_time
 import numpy as np
 
 import core
-from core.atlas.orientation import doubt_of, oriented, planes_of
+from core.atlas.orientation import doubts_of, oriented, planes_of
 from tools import blender
 
 from . import machine, table
@@ -323,8 +323,8 @@ def oriented_strokes(thing, gap):
     try:
         found = oriented(felt, planes)
     except ValueError as error:
-        return felt, np.nan, ("refused", str(error)), process_time() - start
-    doubt = doubt_of(np.vstack(felt), found, planes)
+        return felt, np.nan, f"refused: {error}", process_time() - start
+    doubt = next(doubts_of(np.vstack(felt), found, planes), None)
     seconds = process_time() - start
     return felt, np.mean(np.einsum("ni,ni->n", found, normals) > 0.0), doubt, seconds
 
@@ -342,10 +342,8 @@ def print_orientation(only, is_coarse):
         count = sum(map(len, felt))
         if is_coarse and doubt is None and right < RIGHT and FEWEST <= count <= MOST:
             atlas = core.atlas_of(felt, noise=NOISE)
-            doubt = atlas.status, atlas.message
-        rows.append(
-            [name, f"{wall:g}", str(count), f"{100 * right:.2f}", " ".join(doubt or ()), f"{seconds:.1f}"]
-        )
+            doubt = next(iter(atlas.doubts), None)
+        rows.append([name, f"{wall:g}", str(count), f"{100 * right:.2f}", str(doubt or ""), f"{seconds:.1f}"])
         print(rows[-1], file=sys.stderr, flush=True)
     gaps = f"gaps of {COARSE if is_coarse else CLOSE:g} half walls"
     table([gaps, "wall", "contacts", "% outward", "doubt", "s"], rows)

@@ -32,7 +32,7 @@ from .contours.finger import Surface
 from .contours.local_geometry import DegenerateCurvesError, Frame
 from .contours.tracking import track
 from .exploration.extent import Exploration
-from .exploration.mesh_error import MeshError, judged_by_mesh, mesh_error
+from .exploration.mesh_error import MeshError, doubts_by_mesh, mesh_error
 from .exploration.options import ExplorationOptions
 from .exploration.side_by_side import exploring_many
 from .exploration.touches import explore, explore_many
@@ -47,10 +47,11 @@ from .reconstruction.options import METHODS
 from .reconstruction.result import Reconstruction
 from .reconstruction.serialization import from_dict, to_dict
 from .reconstruction.status import CONTRADICTING, DOUBTFUL_STD
-from .scan.facets import has_few_facets, is_beside_bend
+from .scan.facets import is_beside_bend, with_facets
 from .scan.pose_search import Pose, register
 from .scan.sampling import scattered, spaced, spaced_count
 from .scan.verification import reachable, verify, verifying
+from .verdict import FINER, OK, SHORTER_EDGES, UNCERTAIN, Doubt, status_of
 
 __version__ = "0.1.0"  # That of blender_manifest.toml; python -m tools.release compares them.
 __all__ = [
@@ -58,10 +59,14 @@ __all__ = [
     "CREASE",
     "DOUBTFUL_STD",
     "EXTENT",
+    "FINER",
     "METHODS",
     "NOT_MONGE",
     "NO_CONTACT",
+    "OK",
+    "SHORTER_EDGES",
     "SOLVERS",
+    "UNCERTAIN",
     "UNEXPLAINED",
     "UNIT_METERS",
     "WHERE",
@@ -70,6 +75,7 @@ __all__ = [
     "Contour",
     "DegenerateCurvesError",
     "Domain",
+    "Doubt",
     "Edge",
     "Exploration",
     "ExplorationOptions",
@@ -92,6 +98,7 @@ __all__ = [
     "cover_contacts",
     "covered_by",
     "distances",
+    "doubts_by_mesh",
     "expected_touches",
     "explore",
     "explore_many",
@@ -100,10 +107,8 @@ __all__ = [
     "fit_error",
     "from_dict",
     "gaussian_curvature_stds",
-    "has_few_facets",
     "in_running_order",
     "is_beside_bend",
-    "judged_by_mesh",
     "mean_height_stds",
     "mesh_error",
     "overlapped",
@@ -115,6 +120,7 @@ __all__ = [
     "shortest_edge",
     "spaced",
     "spaced_count",
+    "status_of",
     "stops_at",
     "suggest_plane",
     "thinnest_wall",
@@ -124,5 +130,6 @@ __all__ = [
     "verify",
     "verifying",
     "vertices_shown",
+    "with_facets",
     "with_height_stds",
 ]

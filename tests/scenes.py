@@ -26,6 +26,11 @@ def _sphere(segments, rings):
     return vertices, faces
 
 
+def is_of_facets(record):
+    """Whether the record of a patch has the doubt that its curvature is that of facets."""
+    return any(doubt["code"] == "facets" for doubt in record["doubts"])
+
+
 def add_sphere(bpy, segments=128, rings=64, radius=2.0, location=(0.0, 0.0, 0.0)):
     """Adds a finely faceted sphere, active and the only one selected, and returns it."""
     vertices, faces = _sphere(segments, rings)

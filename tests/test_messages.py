@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/messages.md has every message that the sources have, no other, and each is in a test."""
+"""docs/messages.md has every doubt and message that the sources have, no other, and each is in a test."""
 
 import ast
 import re
@@ -8,12 +8,15 @@ from pathlib import Path
 
 import pytest
 
+from core.verdict import REASONS, Doubt
+from tools import messages as page
+
 ROOT = Path(__file__).parent.parent
-STATUS = re.compile(r"\| (ok|any|uncertain|outdated|not_)")
+STATUS = re.compile(r"\| (ok|any|outdated)")
 ROWS = [
     cell.strip().replace("\\|", "|")
     for line in (ROOT / "docs" / "messages.md").read_text(encoding="utf-8").splitlines()
-    if line.startswith("|") and not line.startswith("|--")
+    if line.startswith("|") and not line.startswith(("|--", "| code", "| `"))
     for cell in line.split(" | ")[slice(1, 2) if STATUS.match(line) else slice(1)]
 ]
 ROWS = [row.strip("| ") for row in ROWS if row.strip("| ") not in ("message", "status")]
@@ -80,7 +83,45 @@ def test_every_row_is_a_message_and_in_a_test(row):
     if row.startswith(("…: expected", "The patch describes")):
         return
     assert row in MESSAGES
+    assert_in_a_test(fixed)
+
+
+def assert_in_a_test(fixed):
+    """Whether tests have three words in a row of one of these lists."""
     tests = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("*.py"))
     words = " ".join(re.findall(r"\w+", tests))
     runs = [" ".join(part[i : i + 3]) for part in fixed for i in range(len(part) - 2)]
     assert any(run in words for run in runs), "no test has any three words of it"
+
+
+def test_the_table_of_doubts_is_that_of_the_code():
+    _, inside, _ = page.parts(page.PAGE.read_text(encoding="utf-8"))
+    assert inside == page.table()  # else: python -m tools.messages
+
+
+@pytest.mark.parametrize("code", REASONS)
+def test_each_doubt_is_in_a_test(code):
+    assert_in_a_test([re.findall(r"\w+", part) for part in re.split(r"{[^}]*}", REASONS[code].sentence)])
+
+
+@pytest.mark.parametrize("code", REASONS)
+def test_each_doubt_has_a_sentence_and_advice_that_is_left_over(code):
+    useless, words = REASONS[code].advice[:-1], ("here", "there")
+    doubt = Doubt(code, 0.5, 0.25, words, useless)
+    assert str(doubt) == f"{doubt.sentence}: {REASONS[code].advice[-1]}."
+    assert "{" not in doubt.sentence
+
+
+def test_only_the_verdict_has_the_word_of_a_doubtful_status():
+    """Status, sentence and advice are made in one place."""
+    for folder in ("core", "tactile_addon"):
+        for path in (ROOT / folder).rglob("*.py"):
+            if path != ROOT / "core" / "verdict.py":
+                constants = [
+                    n.value
+                    for n in ast.walk(ast.parse(path.read_text("utf-8")))
+                    if isinstance(n, ast.Constant)
+                ]
+                assert not {"uncertain", "not_converged"}.intersection(
+                    c for c in constants if isinstance(c, str)
+                ), path

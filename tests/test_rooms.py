@@ -19,6 +19,7 @@ ROOMS = {
         "lapack",
         "steps",
         "triangles",
+        "verdict",
         "contours",
         "contact_data",
         "patch",

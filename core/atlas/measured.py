@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """An atlas of contacts that were measured before, such as a robot's rasters, where no more can be felt."""
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -20,6 +20,7 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.start import TOUCH_ROUNDING, too_coarse
 from ..steps import chunked, part_of, result_of
 from ..triangles import row_dot
+from ..verdict import Doubt, beyond
 from .charts import AZIMUTHS, Charts
 from .connectivity import connected_pieces
 from .finger import FACING
@@ -27,7 +28,7 @@ from .frontier import RimPlace
 from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
 from .object_atlas import AT_ONCE, Atlas, joined_surface
-from .orientation import doubt_of, oriented, place_text, planes_of, sharpened
+from .orientation import doubts_of, oriented, place_text, planes_of, sharpened
 from .unfelt import uncovered_places
 
 # python -m benchmarks.robot judges these.
@@ -87,7 +88,7 @@ def cover_contacts(
     largest = None if tolerance is None else number("tolerance", tolerance, above=0.0)
     noise = None if noise is None else number("noise", noise, least=0.0)
     strokes, points, noise = _strokes(contours_or_strokes, noise, largest)
-    contacts, doubt = _contacts(strokes, points, outward, noise)
+    contacts, doubts = _contacts(strokes, points, outward, noise)
     cloud = _Cloud(contacts, cKDTree(contacts.points), noise, largest)
     yield 0.0
     radius, noise = yield from cloud.least_radius_and_noise()
@@ -99,17 +100,20 @@ def cover_contacts(
     off_surface = partial(_off_surface, atlas, noise, most)
     distances, far = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
     worst = _largest_cluster(far, distances, contacts.links)
-    status, text = _agreement(contacts, distances, far, worst)
-    places = [_place_at(contacts, i, radius) for i in worst[:1] if status != "ok"]
-    said = "" if cloud.noise else f" No noise was given; that of the fit is {noise:.2g}."
-    doubt = doubt or _doubt_of_surface(atlas, 0.0 if cloud.noise else noise, most)
-    return replace(atlas, agreement=doubt or (status, text + said), unexplained=tuple(places))
+    off = _doubts_of_contacts(contacts, distances, far, worst)
+    doubts += [*_doubts_of_surface(atlas, 0.0 if cloud.noise else noise, most), *off]
+    return replace(
+        atlas,
+        contradictions=tuple(doubts),
+        agreement=_agreement(contacts, distances, far, worst, 0.0 if cloud.noise else noise),
+        unexplained=tuple(_place_at(contacts, i, radius) for i in worst[: len(off)]),
+    )
 
 
 def _contacts(
     strokes: list[Contour], points: Array, outward: ArrayLike | None, noise: float
-) -> tuple[MeasuredContacts, tuple[str, str] | None]:
-    """Contacts (n, 3) of strokes with outward normals, and why the normals are in doubt, if they are."""
+) -> tuple[MeasuredContacts, list[Doubt]]:
+    """Contacts (n, 3) of strokes with outward normals, and why the normals are in doubt."""
     up = None if outward is None else unit_vector("outward", outward)
     own = [np.zeros(stroke.points.shape) if stroke.normals is None else stroke.normals for stroke in strokes]
     known = np.repeat([stroke.normals is not None for stroke in strokes], [len(some) for some in own])
@@ -119,14 +123,14 @@ def _contacts(
         normals[~known] = oriented([stroke.points for stroke in strokes], planes, normals, up)[~known]
     else:
         _require_one_side(points, normals)
-    doubt = doubt_of(points, normals, planes)
+    doubts = list(doubts_of(points, normals, planes))
     normals[~known] = sharpened(points, normals, planes)[~known]
     balls = np.repeat([stroke.ball or 0.0 for stroke in strokes], [len(some) for some in own])
     if balls.any():
         centers, points = points, points - balls[:, None] * normals
-        doubt = doubt or _beyond_bend(centers, points, planes.links)
+        doubts += _beyond_bend(centers, points, planes.links)
         planes = planes_of(points, noise)
-    return MeasuredContacts(points, normals, planes.reach, planes.links), doubt
+    return MeasuredContacts(points, normals, planes.reach, planes.links), doubts
 
 
 def _strokes(
@@ -190,20 +194,16 @@ def _require_one_side(points: Array, normals: Array) -> None:
         )
 
 
-def _beyond_bend(centers: Array, contacts: Array, links: NDArray[np.intp]) -> tuple[str, str] | None:
-    """The status and a sentence, if a ball is larger than the bends of its centers (n, 3) at many of them.
+def _beyond_bend(centers: Array, contacts: Array, links: NDArray[np.intp]) -> Iterator[Doubt]:
+    """Whether a ball is larger than the bends of its centers (n, 3) at many of them.
 
     There kappa_center < -1 / r, and contacts (n, 3) lie the other way around than their centers.
     """
     ways, below = (points[links] - points[:, None] for points in (centers, contacts))
     turned = row_dot(ways, below) < -TURNED * row_dot(ways, ways)
     beyond = turned.mean(axis=1) > TURNED
-    if beyond.mean() <= TURNED:
-        return None
-    return "uncertain", (
-        f"Centers around {place_text(centers[beyond])} bend more than a ball of this radius can: give the "
-        "radius of the ball, or use a smaller one."
-    )
+    if beyond.mean() > TURNED:
+        yield Doubt("ball", float(beyond.mean()), TURNED, (place_text(centers[beyond]),))
 
 
 def _off_surface(
@@ -219,19 +219,11 @@ def _off_surface(
     return np.abs(distances), far | (row_dot(faces, normals) < 0.0)
 
 
-def _doubt_of_surface(atlas: Atlas, noise: float, most: float) -> tuple[str, str] | None:
-    """The status and a sentence, if contacts scatter by a noise above `most`, or surround a cavity."""
-    if noise > most:
-        return "uncertain", (
-            f"Contacts scatter by {noise:.2g} about the smallest patches, and no noise was given: give it, "
-            "or check whether files or strokes are off each other."
-        )
+def _doubts_of_surface(atlas: Atlas, noise: float, most: float) -> Iterator[Doubt]:
+    """Whether contacts scatter by a noise above `most`, or surround a cavity."""
+    yield from beyond("noise", noise, most)
     if not atlas.uncovered and atlas.reference.indicator.values[0, 0, 0] > 0.0:  # It is inside there.
-        return "uncertain", (
-            "Normals point inward all around, so the contacts surround a cavity: turn the normals if they "
-            "are those of a solid."
-        )
-    return None
+        yield Doubt("cavity")
 
 
 def _largest_cluster(far: NDArray[np.bool_], distances: Array, links: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -242,24 +234,37 @@ def _largest_cluster(far: NDArray[np.bool_], distances: Array, links: NDArray[np
     return cluster[np.argsort(-distances[cluster], kind="stable")]
 
 
-def _agreement(
+def _doubts_of_contacts(
     contacts: MeasuredContacts, distances: Array, far: NDArray[np.bool_], worst: NDArray[np.intp]
-) -> tuple[str, str]:
-    """The status and a sentence on which contacts (n,) are far off the surface, and the worst cluster (k,).
+) -> list[Doubt]:
+    """Whether more than a few contacts (n,) are far off the surface, given the worst cluster of them (k,).
 
     Few may be off, as at sharp edges. But more side by side than a quadric has coefficients show a shape.
     """
-    if not far.any():
-        return "ok", "The surface is closed, and all contacts agree with it."
-    off = f"{np.count_nonzero(far)} of {len(far)} contacts"
-    where = (
-        f"by up to {distances[far].max():.2g}, most together around {place_text(contacts.points[worst[:1]])}"
-    )
-    if far.mean() <= FEW and len(worst) <= len(QUADRIC):
-        return "ok", f"The surface is closed. All but {off} agree with it, which are off {where}."
-    return "uncertain", (
-        f"{off} are off the surface or face the other way, {where}: feel more there, or give their noise."
-    )
+    if not far.any() or (far.mean() <= FEW and len(worst) <= len(QUADRIC)):
+        return []
+    words = f"{np.count_nonzero(far)} of {len(far)} contacts", place_text(contacts.points[worst[:1]])
+    return [Doubt("off_surface", float(distances[far].max()), words=words)]
+
+
+def _agreement(
+    contacts: MeasuredContacts,
+    distances: Array,
+    far: NDArray[np.bool_],
+    worst: NDArray[np.intp],
+    noise: float,
+) -> str:
+    """How contacts (n,) agree with the surface if there is no doubt; `noise` is that of the fit, or 0."""
+    message = "The surface is closed, and all contacts agree with it."
+    if far.any():
+        most, where = distances[far].max(), place_text(contacts.points[worst[:1]])
+        message = (
+            f"The surface is closed. All but {np.count_nonzero(far)} of {len(far)} contacts agree with it, "
+            f"which are off by up to {most:.2g}, most together around {where}."
+        )
+    if noise:
+        message += f" No noise was given; that of the fit is {noise:.2g}."
+    return message
 
 
 def _place_at(contacts: MeasuredContacts, i: int, radius: float) -> RimPlace:

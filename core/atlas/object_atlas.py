@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A whole object as it was felt (paper, VI): the graph of its patches, and one surface of all of them."""
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple
@@ -16,6 +16,7 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
 from ..steps import chunked, result_of
 from ..triangles import LEAST_DIVISOR, triangle_cross
+from ..verdict import FINER, TOUCHES, Doubt, beyond, status_of
 from .borders import Border, snapped_to_border
 from .boundaries import Edge, edges_of, gaussian_curvature_of, node_dict
 from .charts import Charts
@@ -128,7 +129,7 @@ class Atlas:
     border : where a finger felt the surface end; None if there was none
     is_cut_short : whether touches ended because no more were allowed, or were stopped
     contacts : those that were measured before; None if they were felt for this atlas
-    agreement : whether these agree with each other and the surface: a status and a sentence
+    contradictions : doubts about these, the gravest first; agreement : a sentence on them if there is none
     unexplained : the place around which most of those that do not agree are together
     """
 
@@ -142,7 +143,8 @@ class Atlas:
     border: Border | None = None
     is_cut_short: bool = False
     contacts: MeasuredContacts | None = None
-    agreement: tuple[str, str] | None = None
+    contradictions: tuple[Doubt, ...] = ()
+    agreement: str = ""
     unexplained: tuple[RimPlace, ...] = ()
 
     def __repr__(self) -> str:
@@ -179,49 +181,39 @@ class Atlas:
     @property
     def status(self) -> str:
         """ "ok" or "uncertain"."""
-        return self._verdict[0]
+        return status_of(self.gravest)
 
     @property
     def message(self) -> str:
-        """The status in a sentence, with advice."""
-        return self._verdict[1]
+        """The gravest doubt in a sentence with advice, or that there is none."""
+        message = "The object was felt everywhere a finger could reach."
+        return self.agreement or message if self.gravest is None else str(self.gravest)
 
     @cached_property
-    def _verdict(self) -> tuple[str, str]:
-        """The status and the message of what comes first: contacts, unfelt places, thin walls, the check."""
-        if self.agreement and self.agreement[0] != "ok":
-            return self.agreement
+    def doubts(self) -> tuple[Doubt, ...]:
+        """All reasons to doubt it, the gravest first: of contacts, unfelt places, thin walls, the check."""
+        return tuple(self._doubting())
+
+    @cached_property
+    def gravest(self) -> Doubt | None:
+        """The gravest doubt, or None."""
+        return next(self._doubting(), None)
+
+    def _doubting(self) -> Iterator[Doubt]:
+        """Reasons to doubt it, the gravest first."""
+        yield from self.contradictions
         if self.uncovered:
-            return self._ended()
+            places = (many(len(self.uncovered), "place", "places"),)
+            felt = "cut_short" if self.is_cut_short else "goes_on"
+            yield Doubt(felt if self.contacts is None else "unfelt", len(self.uncovered), words=places)
         inside = self.reference.indicator
         if inside.thinnest < THIN * inside.resolved:
-            thin, resolved = (100.0 * width / inside.size for width in (inside.thinnest, inside.resolved))
-            return "uncertain", (
-                f"Walls or gaps of {thin:.2g} % of the size were felt, and what is thinner than "
-                f"{resolved:.2g} % may be bridged or pierced: touch such parts as objects of their own."
-            )
-        if self.is_rough:
-            rough = 100.0 * self._rough[0]
-            return "uncertain", (
-                f"The standard deviation is above the tolerance on {rough:.0f} % of the surface: touch there "
-                "again or use a larger tolerance."
-            )
-        return self._checked()
-
-    def _ended(self) -> tuple[str, str]:
-        """The verdict where places are uncovered."""
-        places = many(len(self.uncovered), "place", "places")
-        if self.contacts is not None:
-            return "uncertain", f"Nothing was felt beyond {places} where the object may go on: touch there."
-        if self.is_cut_short:
-            return "uncertain", (
-                f"The patches end at {places} where the object goes on: allow more touches or a larger "
-                "tolerance."
-            )
-        return "uncertain", (
-            f"The patches end at {places} where the object goes on, and touches found no patch there: "
-            "use a smaller tolerance."
-        )
+            yield Doubt("thin", inside.thinnest / inside.size, inside.resolved / inside.size)
+        yield from beyond("rough", self._rough[0], ROUGH)
+        wrong = int(self.contradicting.sum()) + len(self.check.missed)
+        if wrong:
+            rays = (str(len(self.check.points) + len(self.check.missed)),)
+            yield Doubt("rays", wrong, words=rays, useless=(FINER if self.is_cut_short else TOUCHES,))
 
     @property
     def is_rough(self) -> bool:
@@ -295,19 +287,6 @@ class Atlas:
             found = replace(found, charts=charts, reference=reference)
             yield 1.0
         return found
-
-    def _checked(self) -> tuple[str, str]:
-        """The verdict of the check."""
-        wrong = int(self.contradicting.sum()) + len(self.check.missed)
-        count = len(self.check.points) + len(self.check.missed)
-        if wrong:
-            advice = "allow more touches" if self.is_cut_short else "use a smaller tolerance"
-            return "uncertain", (
-                f"{wrong} of {count} rays from outside met something else than the surface: {advice}."
-            )
-        if self.agreement:
-            return self.agreement
-        return "ok", "The object was felt everywhere a finger could reach."
 
     def next_touch(self, failed: ArrayLike = ()) -> NextTouch | None:
         """Where the next touch would bring most, or None if all is covered to the tolerance and explained.
@@ -421,6 +400,7 @@ class Atlas:
         return {
             "version": GRAPH_VERSION,
             **{name: getattr(self, name) for name in ("status", "message", "tolerance")},
+            "doubts": [doubt.to_dict() for doubt in self.doubts],
             "nodes": [node_dict(r, float(std)) for r, std in zip(self.patches, stds, strict=True)],
             "edges": [edge.to_dict() for edge in self.edges],
             "uncovered": [{"point": list(p.point), "outward": list(p.normal)} for p in self.uncovered],

@@ -7,13 +7,14 @@ Of two contacts on an arc one normal is the mirror image of the other in the pla
 Gumhold 2009), also across a sharp edge, a wall or a gap. Links along strokes come first.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..arguments import Array
 from ..triangles import normalized, row_dot
+from ..verdict import Doubt
 from .connectivity import Indices, connected_pieces
 
 # python -m benchmarks.measured --orientation judges these.
@@ -272,26 +273,18 @@ def _global_sign(normals: Array, known: Array | None, up: Array | None, number: 
     return float(np.copysign(1.0, mean))
 
 
-def doubt_of(points: Array, normals: Array, planes: Planes) -> tuple[str, str] | None:
-    """The status and a sentence that names a place, if outward normals (n, 3) of contacts are in doubt."""
+def doubts_of(points: Array, normals: Array, planes: Planes) -> Iterator[Doubt]:
+    """Where outward normals (n, 3) of contacts are in doubt."""
     i, j = np.repeat(np.arange(len(points)), LINKS), planes.links.ravel()
     cosine, bend = reflection_agreement(points, normals, i, j)
     against = np.bincount(i, cosine < OPPOSED) * 2 > LINKS
     if against.mean() > DOUBTED:
-        return "uncertain", (
-            f"Normals contradict each other around {place_text(points[against])}: strokes are too far apart "
-            "there, or normals are wrong."
-        )
+        yield Doubt("opposed", float(against.mean()), DOUBTED, (place_text(points[against]),))
     # Contacts that are as near as their noise are of one wall.
     apart = np.abs(row_dot(normals[i], points[j] - points[i])) > THROUGH * planes.rms[i]
     walls = np.bincount(i, apart & (np.abs(row_dot(normals[i], normals[j])) > FACING) & (bend > FACING)) > 0
     if walls.mean() > CONFUSED:
-        return "uncertain", (
-            f"Strokes around {place_text(points[walls])} are farther apart than half the thickness of the "
-            "wall or gap there, so its sides may be confused: make strokes nearer to each other, or measure "
-            "normals."
-        )
-    return None
+        yield Doubt("sides", float(walls.mean()), CONFUSED, (place_text(points[walls]),))
 
 
 def place_text(points: Array) -> str:

@@ -11,7 +11,8 @@ from ..arguments import Array
 from ..contours.contour import Vector, along, dot, scaled, vector_of
 from ..contours.finger import Surface, contact_of
 from ..reconstruction.result import Reconstruction
-from ..reconstruction.status import CONTRADICTING, DOUBTFUL_GAP, over_nothing
+from ..reconstruction.status import CONTRADICTING, DOUBTFUL_GAP, useless
+from ..verdict import OK, Doubt, beyond
 
 # benchmarks.refusals counts the patches that are off, but ok.
 MESH_LAYERS = 8  # A sample is compared with no more layers of the mesh above and below it,
@@ -59,17 +60,15 @@ def side_of(r: Reconstruction, surface: Surface) -> float:
     return 1.0 if hit is None else math.copysign(1.0, dot(contact_of(hit, 1.0)[1], up))
 
 
-def judged_by_mesh(r: Reconstruction, error: MeshError) -> tuple[str, str]:
-    """Status and message: those of the fit, unless it has no doubt but the mesh contradicts it."""
-    std, percent, mean = r.mean_height_std, 100.0 / r.radius, error.height or 0.0
-    if r.status == "ok" and error.missing > DOUBTFUL_GAP:
-        return over_nothing(r, error.missing)
-    if r.status != "ok" or mean <= CONTRADICTING * std:
-        return r.status, r.message
-    return "uncertain", (
-        f"The mesh is {percent * mean:.3g} % of the radius off the patch on average, which expects "
-        f"{percent * std:.3g} %, so the curves miss something between them: use a shorter extent or "
-        "add sampling planes."
+def doubts_by_mesh(r: Reconstruction, error: MeshError) -> tuple[Doubt, ...]:
+    """The doubts of the fit or, if it has none, how the mesh contradicts it."""
+    mean, most = error.height or 0.0, CONTRADICTING * r.mean_height_std
+    if r.status != OK:
+        return r.doubts
+    tried = useless(r.method, r.contours)
+    return (
+        *beyond("gap", error.missing, DOUBTFUL_GAP, tried),
+        *beyond("mesh", mean / r.radius, most / r.radius, tried),
     )
 
 

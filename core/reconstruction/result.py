@@ -3,6 +3,7 @@
 """A patch with its frame, and all results that follow from it."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -17,7 +18,7 @@ from ..bayes.normals import contradiction, measured_normals, scatter
 from ..bayes.other_curves import contradicting_curve
 from ..bayes.posterior import SurfacePosterior, coefficients_of, terms_to
 from ..bayes.prior import FREE
-from ..contours.contour import Contour, read_only
+from ..contours.contour import SURFACE_ENDS, Contour, read_only, stops_at
 from ..contours.curves import (
     Curves,
     curves_through,
@@ -27,11 +28,13 @@ from ..contours.curves import (
 )
 from ..contours.local_geometry import Frame
 from ..paper import least_squares
-from ..patch.domain import Domain
+from ..patch.domain import AT_POINT, Domain
 from ..patch.geometry import Geometry, similarity, total_absolute_curvature
 from ..patch.monge import MongePatch, exponents, monomials
 from ..patch.triangulation import patch_mesh
-from .status import Taps, contradicted, doubt, notes
+from ..verdict import Doubt, beyond, status_of
+from . import status
+from .status import Taps
 
 NEAR_POINT = 0.6  # This share of a process's deviation is left at the point (benchmarks.real).
 # The mesh is off the patch by at most this share of mean_height_std (benchmarks.patch_mesh).
@@ -52,6 +55,8 @@ class Reconstruction:
     point_std : its standard deviation along the normal, in units of L; 1 where only contacts show the surface
     converged : whether its solver converged
     taps : what was felt between the curves; None if nobody tapped there
+    shape_curvatures : (n, 2), estimates of the principal curvatures, in order, of the shape that few facets
+        stand for; none where the mesh is fine or unknown
     known_height_std : mean_height_std, if it is known already
     known_curves : the contours as Curves of one touch, in the world, if they are known already
 
@@ -69,12 +74,14 @@ class Reconstruction:
     converged: bool = True
     strokes: Array = field(default_factory=lambda: np.empty((0, 3)))
     taps: Taps | None = None
+    shape_curvatures: Array = field(default_factory=lambda: np.empty((0, 2)))
     known_height_std: float | None = None
     known_curves: Curves | None = None
 
     def __post_init__(self) -> None:
         copies = tuple(contour.copied() for contour in self.contours)
-        vars(self).update(contours=copies, strokes=read_only(self.strokes), point=read_only(self.point))
+        arrays = {name: read_only(getattr(self, name)) for name in ("strokes", "point", "shape_curvatures")}
+        vars(self).update(contours=copies, **arrays)
 
     def __repr__(self) -> str:
         point = ", ".join(f"{x:.4g}" for x in self.frame.origin)
@@ -228,7 +235,14 @@ class Reconstruction:
         if self.method != "bayes":
             off = posterior.polynomial[2:FREE] - coefficients_of(self.patch.scaled(1.0 / self.radius))[2:FREE]
             found = found + np.outer(off, off)
-        return found + self.bends.covariance
+        # One deviation in each direction: that of the coefficient of xy is larger by the square root of 2.
+        facets = (0.5 * self.radius * self._off_shape.max(initial=0.0)) ** 2 * np.diag([1.0, 2.0, 1.0])
+        return found + self.bends.covariance + facets
+
+    @property
+    def _off_shape(self) -> Array:
+        """How far principal curvatures are off each estimate of those of the shape, (n,)."""
+        return np.abs(np.sort([self.k1, self.k2]) - self.shape_curvatures).max(axis=1)
 
     @cached_property
     def bends(self) -> Bends:
@@ -331,6 +345,7 @@ class Reconstruction:
             contours=tuple(contour.moved(scale, turn, start, end) for contour in self.contours),
             strokes=end + scale * (self.strokes - start) @ turn.T,
             point=end,
+            shape_curvatures=self.shape_curvatures / scale,
             known_height_std=None,
             known_curves=None,
         )
@@ -338,17 +353,71 @@ class Reconstruction:
     @property
     def status(self) -> str:
         """ "ok", "uncertain" or "not_converged"."""
-        return self._verdict[0]
+        return status_of(self.gravest)
 
     @property
     def message(self) -> str:
-        """The status in a sentence with advice, and what the contacts leave undetermined."""
-        return self._verdict[1] + notes(self)
+        """The gravest doubt in a sentence with advice, and what the contacts leave undetermined."""
+        verdict = "The patch describes its contacts." if self.gravest is None else str(self.gravest)
+        return f"{verdict}{self._notes}"
 
     @cached_property
-    def _verdict(self) -> tuple[str, str]:
-        """The status and its sentence, without notes."""
-        return contradicted(self) or doubt(self) or ("ok", "The patch describes its contacts.")
+    def doubts(self) -> tuple[Doubt, ...]:
+        """All reasons to doubt it, the gravest first."""
+        return tuple(self._doubting())
+
+    @cached_property
+    def gravest(self) -> Doubt | None:
+        """The gravest doubt, or None; the others are not looked for, which would take longer."""
+        return next(self._doubting(), None)
+
+    def _doubting(self) -> Iterator[Doubt]:
+        """Reasons to doubt it, the gravest first."""
+        useless, radius = status.useless(self.method, self.contours), self.radius
+        yield from status.about_facets(self._off_shape, self.shape_curvatures)
+        stops = stops_at(self.contours, self.frame.origin, AT_POINT * radius)
+        yield from status.about_taps(self.taps, any(stop in SURFACE_ENDS for stop in stops), useless)
+        if not self.converged:
+            yield Doubt("steps")
+        if self.method == "least-squares":
+            yield from beyond("condition", self.condition_number, status.DOUBTFUL_CONDITION)
+        yield from status.about_point(
+            self.misses, self.noise, self.point_std, self.contours, self.point, radius
+        )
+        yield from status.about_normals(self.contradiction, self.normal_scatter)
+        yield from beyond("contacts", self.typical_miss / radius, status.DOUBTFUL_FIT + self.noise, useless)
+        yield from beyond("heights", self.mean_height_std / radius, status.DOUBTFUL_STD, useless)
+        yield from status.about_frame(self.posterior, self.contours, useless)
+        yield from self._doubting_shape(useless)
+
+    def _doubting_shape(self, useless: tuple[str, ...]) -> Iterator[Doubt]:
+        """Whether a curve contradicts the others, the surface waves, or its bends are of something else."""
+        deviations, off = self.curve_contradiction
+        if deviations > status.CONTRADICTING_CURVE:
+            yield Doubt("curve", off, status.CONTRADICTING_CURVE * off / deviations)
+        if not len(self.strokes):
+            yield from beyond("waves", self.waves / self.radius, status.DOUBTFUL_WAVES, useless)
+        bent, std = self.radius * max(abs(self.k1), abs(self.k2)), self.posterior.curvature_std()
+        if status.is_on_flat_face(bent, std, self.contours, self.frame.origin):
+            yield Doubt("flat_face", bent, std, useless=useless)
+        yield from beyond("folds", self.bends.folded, status.DOUBTFUL_FOLD, useless)
+        yield from beyond("bend", self.curvature_contradiction, status.SIGNIFICANT, useless)
+
+    @property
+    def _notes(self) -> str:
+        """What is to be known whatever the status: sentences, each after a space."""
+        message = ""
+        if self.taps is not None and self.taps.missed:
+            missed, number = self.taps.missed, self.taps.number
+            message += f" At {missed} of {number} taps between the curves there is no surface."
+        if self.posterior.is_round:
+            message += (
+                " The two curvatures are equal within their error, so there are no principal directions."
+            )
+        if self.null_space_dimension:
+            terms = terms_to(self.patch.degree)
+            message += f" These planes cannot show {self.null_space_dimension} of the {terms} ways to bend."
+        return message
 
     @cached_property
     def curve_contradiction(self) -> tuple[float, float]:

@@ -32,8 +32,8 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
     """A reconstruction as JSON has it: a dict of numbers, words, lists and dicts, which `from_dict` reads.
 
     Lengths are in the caller's unit, those of the geometry in its frame. `noise`, `point_std` and `posterior`
-    are in units of the radius; the latter is None for the paper's methods, whose surface is `patch`. `status`
-    and `message` are for readers only: they follow from the rest.
+    are in units of the radius; the latter is None for the paper's methods, whose surface is `patch`. What is
+    for readers only follows from the rest: `status`, `message` and `doubts`.
     """
     posterior = r.posterior if r.method == "bayes" else None
     return {
@@ -41,6 +41,7 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
         "method": r.method,
         "status": r.status,
         "message": r.message,
+        "doubts": [doubt.to_dict() for doubt in r.doubts],
         "converged": r.converged,
         "noise": r.noise,
         "point": r.point.tolist(),
@@ -57,6 +58,7 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
         "strokes": r.strokes.tolist() if len(r.strokes) else None,
         "posterior": posterior and _posterior_dict(posterior),
         "taps": None if r.taps is None else r.taps._asdict(),
+        "shape_curvatures": r.shape_curvatures.tolist() if len(r.shape_curvatures) else None,
     }
 
 
@@ -82,7 +84,8 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
         raise ValueError(
             f"version: expected {VERSION}, got {shown(d['version'])}: this was written by another release"
         )
-    method, strokes, patch = _of(d, "method"), _of(d, "strokes"), _polynomial(_of(d, "patch"))
+    method, strokes, shape = (_of(d, key) for key in ("method", "strokes", "shape_curvatures"))
+    patch = _polynomial(_of(d, "patch"))
     if not isinstance(method, str) or method not in METHODS:
         raise ValueError(f"method: expected one of {', '.join(METHODS)}, got {shown(method)}")
     surface = _posterior(_of(d, "posterior")) if method == "bayes" else None
@@ -98,6 +101,9 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
         converged=_converged(_of(d, "converged")),
         strokes=np.empty((0, 3)) if strokes is None else finite_array("strokes", strokes, (None, 3), LARGEST),
         taps=_taps(d.get("taps")),
+        shape_curvatures=(
+            np.empty((0, 2)) if shape is None else finite_array("shape_curvatures", shape, (None, 2), LARGEST)
+        ),
         known_height_std=number("mean_height_std", _of(d, "mean_height_std"), least=0.0),
     )
     places = {f"contours[{i}]": contour.points for i, contour in enumerate(r.contours)}

@@ -1,32 +1,33 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the curvature of a touch is that of the facets it has felt, not of the shape they stand for."""
+"""The curvatures of the shape that the facets of a mesh stand for, where a touch has felt few of them."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import Array
+from ..arguments import SMALLEST, Array
 from ..patch.differential_geometry import Derivatives
 from ..reconstruction.result import Reconstruction
 
 # benchmarks.facets shows how far curvatures are off with these.
-OTHER = 0.2  # Curvatures are those of a facet if they are off by this share of the larger one of the shape.
-# That is by how facets turn within the first number of widths, or by corners of facets within the second one
-# if those within the third one have the same curvatures; all where the patch turns by BEND or less.
-TURNING, NEAR, FAR = 2.0, 0.6, 1.3
+# The shape's are those by which facets turn within the first number of widths, and those of the corners of
+# facets within the others, where the patch turns by BEND or less.
+TURNING, CORNERS = 2.0, (0.6, 1.3)
+# Corners determine a quadric if the smallest singular value of their equations is above this share.
+DETERMINED = 0.01
 BEND = math.radians(40.0)
 TURNS = np.radians([0.0, 20.0, 40.0])  # The curves, turned by these around the normal, show where facets are.
 # Edges between these angles stand for a smooth bend,
 DISTINCT_COSINE, SMOOTH_COSINE = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))
-# if both facets have this share of the wider one's width across it, and of the radius; else one is a fillet.
+# if both facets have this share of the wider one's width across it; else one is a fillet. Facets are fine if
+# that at the point is narrower than this share of the radius.
 MIN_WIDTH_RATIO = 0.25
-# On fewer facets than this, of different normals, half of the radius suffices: a touch along a cone is long.
-FEW, PARALLEL_COSINE = 8, math.cos(math.radians(0.1))
 NEIGHBOR_STEP = 0.05  # The facet behind an edge is looked for this share of the width beyond it.
 
 
@@ -42,47 +43,40 @@ class Facet(NamedTuple):
         return float(np.ptp(self.corners @ across)) / length if length else 0.0
 
 
-def has_few_facets(
+def with_facets(
     r: Reconstruction, face_near: Callable[[Array], int], corners_of: Callable[[int], ArrayLike]
-) -> bool:
-    """Whether a facet at the point, which stands for a smooth shape, has other curvatures than that shape.
+) -> Reconstruction:
+    """The reconstruction, with curvatures as uncertain as facets leave those of the shape they stand for.
 
-    The curvatures of the shape are those by which normals turn from facet to facet, or those of the corners
-    of facets, whichever are nearer. A mesh is fine if the contacts lie on many facets, and these are narrow
-    compared with the radius. If they lie on one, which may be bent itself, the curvatures are its own.
+    It is the same on a fine mesh, whose facets are narrow compared with the radius. A facet whose edges are
+    all sharp or those of fillets, as that of a cube, is the shape itself.
 
     face_near : the number of the face nearest to a point (3,) of the world
     corners_of : the corners (k, 3) of a face in the world, in order
-
-    A facet whose edges are all sharp or those of fillets, as that of a cube, is the shape itself.
     """
+    shape = _shape_curvatures(r, face_near, corners_of)
+    return replace(r, shape_curvatures=np.array(shape)) if shape else r
+
+
+def _shape_curvatures(
+    r: Reconstruction, face_near: Callable[[Array], int], corners_of: Callable[[int], ArrayLike]
+) -> list[Array]:
+    """The principal curvatures (2,) of the shape, in order, by how facets turn and by their corners."""
     shape = cache(lambda face: _facet(corners_of(face)))
 
     def facet_near(at: Array) -> Facet:
         """The face nearest to a point (3,)."""
         return shape(face_near(at))
 
-    here, radius = facet_near(r.frame.origin), r.radius
-    width = _width(here, facet_near)
-    felt = set(map(face_near, np.vstack([contour.points for contour in r.contours])))
-    if width < MIN_WIDTH_RATIO * radius:
-        if not (width and _are_few(map(shape, felt))):
-            return False
-        radius *= 0.5
-    if any(_bends(here, facet_near)) and not _is_smooth(here, 0.0, facet_near):
-        return False  # Its bends are those of fillets.
-    points, wide = _around(r, TURNING * width), max(width, radius)
+    width = _smooth_width(facet_near(r.frame.origin), facet_near)
+    if width < max(MIN_WIDTH_RATIO * r.radius, SMALLEST):
+        return []
+    points = _around(r, TURNING * width)
     faces = [face_near(point) for point in points]
-    if not any(_is_smooth(facet, wide, facet_near) for facet in map(shape, set(faces))):
-        return False
-    if len(felt) == 1:
-        return True
+    within = [set(map(face_near, _around(r, share * width))) for share in CORNERS]
+    by_corners = [_of_corners(r, map(shape, some)) for some in within]
     turning = _turning(r, points, [shape(face) for face in faces])
-    near, far = (
-        _of_corners(r, map(shape, set(map(face_near, _around(r, share * width))))) for share in (NEAR, FAR)
-    )
-    found = np.sort([r.k1, r.k2])
-    return _is_off(found, turning) and (_is_off(found, near) or _is_off(far, near))
+    return [turning, *(found for found in by_corners if found is not None)]
 
 
 def is_beside_bend(
@@ -90,10 +84,14 @@ def is_beside_bend(
 ) -> bool:
     """Whether the facet nearest to a point (3,) has an edge that stands for a smooth bend, as on a ball.
 
-    The arguments are those of `has_few_facets`.
+    The arguments are those of `with_facets`.
     """
-    facet = _facet(corners_of(face_near(point)))
-    return _is_smooth(facet, 0.0, lambda at: _facet(corners_of(face_near(at))))
+
+    def facet_near(at: Array) -> Facet:
+        """The face nearest to a point (3,)."""
+        return _facet(corners_of(face_near(at)))
+
+    return _smooth_width(facet_near(point), facet_near) > 0.0
 
 
 def _around(r: Reconstruction, reach: float) -> Array:
@@ -106,17 +104,6 @@ def _around(r: Reconstruction, reach: float) -> Array:
     x, y, z = reach / r.radius * r.frame.to_local(points).T
     turned = [(x * c - y * s, x * s + y * c, z) for c, s in zip(np.cos(TURNS), np.sin(TURNS), strict=True)]
     return r.frame.to_world(np.concatenate(turned, axis=1).T)
-
-
-def _are_few(facets: Iterable[Facet]) -> bool:
-    """Whether facets have fewer than FEW different normals."""
-    normals: list[Array] = []
-    for facet in facets:
-        if all(facet.normal @ normal < PARALLEL_COSINE for normal in normals):
-            normals.append(facet.normal)
-        if len(normals) == FEW:
-            return False
-    return True
 
 
 def _turning(r: Reconstruction, points: Array, facets: list[Facet]) -> Array:
@@ -136,24 +123,29 @@ def _turning(r: Reconstruction, points: Array, facets: list[Facet]) -> Array:
     return np.linalg.eigvalsh([[xx, xy], [xy, yy]])
 
 
-def _of_corners(r: Reconstruction, facets: Iterable[Facet]) -> Array:
-    """The principal curvatures (2,), in order, of the height of degree 2 that fits the corners of facets."""
+def _of_corners(r: Reconstruction, facets: Iterable[Facet]) -> Array | None:
+    """The principal curvatures (2,), in order, of the height of degree 2 that fits the corners of facets.
+
+    None if these do not determine it.
+    """
     x, y, z = r.frame.to_local(np.vstack([facet.corners for facet in facets])).T / r.radius
-    taylor = np.column_stack([np.ones_like(x), x, y, 0.5 * x**2, x * y, 0.5 * y**2])
-    fitted = Derivatives(*np.linalg.lstsq(taylor, z, rcond=None)[0])
+    size = float(np.abs([x, y]).max()) or 1.0
+    u, v = x / size, y / size
+    taylor = np.column_stack([np.ones_like(u), u, v, 0.5 * u**2, u * v, 0.5 * v**2])
+    found, _, rank, _ = np.linalg.lstsq(taylor, z, rcond=DETERMINED)
+    if rank < len(found):
+        return None
+    fitted = Derivatives(*(found / size ** np.array([0, 1, 1, 2, 2, 2])))
     return np.array(fitted.principal_curvatures) / r.radius
 
 
-def _is_off(curvatures: Array, shape: Array) -> bool:
-    """Whether principal curvatures (2,), in order, are off those of the shape, (2,), by more than OTHER."""
-    return bool(np.abs(curvatures - shape).max() > OTHER * np.abs(shape).max())
+def _smooth_width(facet: Facet, facet_near: Callable[[Array], Facet]) -> float:
+    """The largest width of a facet across an edge that stands for a smooth bend, or 0 if none does.
 
-
-def _width(facet: Facet, facet_near: Callable[[Array], Facet]) -> float:
-    """The largest width of a facet across its smooth bends, or if it has none across its longest edge."""
-    edges = np.roll(facet.corners, -1, axis=0) - facet.corners
-    longest = edges[np.argmax((edges**2).sum(axis=1))]
-    return max(map(min, _bends(facet, facet_near)), default=facet.width(longest))
+    An edge to a facet that is much narrower, or wider, is one of a fillet.
+    """
+    bends = _bends(facet, facet_near)
+    return max((min(widths) for widths in bends if min(widths) >= MIN_WIDTH_RATIO * max(widths)), default=0.0)
 
 
 def _bends(facet: Facet, facet_near: Callable[[Array], Facet]) -> Iterator[tuple[float, float]]:
@@ -167,11 +159,6 @@ def _bends(facet: Facet, facet_near: Callable[[Array], Facet]) -> Iterator[tuple
         beyond = facet_near(start + 0.5 * edge + NEIGHBOR_STEP * width * out / np.linalg.norm(out))
         if SMOOTH_COSINE < float(facet.normal @ beyond.normal) < DISTINCT_COSINE:
             yield width, beyond.width(edge)
-
-
-def _is_smooth(facet: Facet, radius: float, facet_near: Callable[[Array], Facet]) -> bool:
-    """Whether an edge of the facet stands for a smooth bend."""
-    return any(min(widths) >= MIN_WIDTH_RATIO * max(*widths, radius) for widths in _bends(facet, facet_near))
 
 
 def _facet(corners: ArrayLike) -> Facet:

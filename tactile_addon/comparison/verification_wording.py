@@ -36,10 +36,13 @@ def verification_summary(record: TouchReport) -> tuple[bool, str]:
     if record["status"] != "ok":
         return True, record["message"]
     unit = units.unit_of(bpy.context.scene, record["radius"])
-    mean, most = (_length(record, f"vertex_distance_{key}", unit) for key in ("mean", "max"))
+    mean = _length(record, "vertex_distance_mean", unit)
+    most = _length(
+        record, max("vertex_distance_max", "patch_distance_max", key=lambda key: found.get(key, 0.0)), unit
+    )
     return False, (
-        f'At {many(vertices, "vertex", "vertices")}, "{name}" is {mean} off the patch on average, '
-        f"{most} at most; the mesh covers {percent:.0f} % of it"
+        f'At {many(vertices, "vertex", "vertices")}, "{name}" is {mean} off the patch on average, and '
+        f"either is {most} off the other at most; the mesh covers {percent:.0f} % of the patch"
     )
 
 
@@ -74,11 +77,11 @@ def verification_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, 
     """(label, value) of everything else that a verification has found."""
     found = record["verification"]
     return [
-        ("Error on Curves", _length(record, "fit_error", unit)),
-        (f"Error on {found['extra_contours']} More", _length(record, "extra_fit_error", unit)),
-        ("Total |K|", f"{found['total_absolute_curvature']:.3g}"),
+        ("Fit Error", _length(record, "fit_error", unit)),
+        (f"Error on {found['extra_contours']} More Curves", _length(record, "extra_fit_error", unit)),
+        ("Total Curvature", f"{found['total_absolute_curvature']:.3g}"),
         ("Overlap", f"{100.0 * found['overlap']:.0f} %"),
-        ("Patch to Mesh", _length(record, "patch_distance_max", unit)),
+        ("Largest Deviation", _length(record, "patch_distance_max", unit)),
     ]
 
 

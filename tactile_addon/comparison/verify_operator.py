@@ -101,7 +101,7 @@ class Verification:
             # Another mesh, as a scan, may show only a part of the object.
             missing = self._error.missing if record["source"] == self.target else 0.0
             error = core.MeshError(mean, missing)
-            record.update(judgment(r, error, record["ended"], record.get("few_facets", False)))
+            record.update(judgment(r, error, record["ended"]))
         return record.to_dict()
 
     def _objects(self) -> tuple[Object, Object]:

@@ -52,6 +52,7 @@ def report_of(patch: Object) -> TouchReport | None:
         frame = np.array([report["frame"][name] for name in ("origin", "d1", "d2", "normal")], dtype=float)
         numbers = [float(report[name]) for name in ("radius", "height_std", "k1", "k2")]
         words = [report[name] for name in ("source", "status", "message", "ended")]
+        words += [doubt[name] for doubt in report["doubts"] for name in ("code", "sentence", "advice")]
         report["is_verified"]
     except (KeyError, TypeError, ValueError, AttributeError):
         return None
@@ -113,7 +114,7 @@ def mark_outdated(patch: Object, message: str) -> None:
     if report is None:
         return
     if VERDICT not in patch:
-        patch[VERDICT] = {key: report[key] for key in ("status", "message")}
+        patch[VERDICT] = {key: report[key] for key in ("status", "message", "doubts")}
     report.update({"status": "outdated", "message": message})
 
 

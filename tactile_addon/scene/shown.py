@@ -67,7 +67,7 @@ def _automatic_range(record: Mapping[str, Any], common: float, flat: float) -> f
     """
     if not common:
         return float(max(record["own_limit"], record["error_limit"]))
-    is_sure = record["status"] != "uncertain"
+    is_sure = record["status"] != core.UNCERTAIN
     if not is_sure and common > flat:
         return float(common)
     # While the probe is dragged, the common range is that of where it was.
@@ -142,7 +142,7 @@ def _share(patches: list[Object]) -> None:
     If the patch that has it has a K that is as good as 0, it is the largest that makes such a K pale.
     """
     records = [obj[RECORD] for obj in patches]
-    sure = [record for record in records if record["status"] != "uncertain"] or records
+    sure = [record for record in records if record["status"] != core.UNCERTAIN] or records
     if all(record.get("error_limit") for record in sure):
         common = max(record["error_limit"] for record in sure)
     else:

@@ -33,7 +33,7 @@ from ..touch.settings import draw_chosen, draw_sensor, draw_solver
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object, PanelMixin
 from ..touch.units import Unit
-from ..touch.wording import registration_summary, verdict
+from ..touch.wording import reasons, registration_summary, verdict
 from ..viewport.pick import TACTILE_OT_pick
 from ..whole_object.object_operator import TACTILE_OT_touch_all_over
 from ..whole_object.object_report import deviation, facets, is_all_within, object_rows, object_verdict
@@ -43,9 +43,10 @@ from .patch_rows import found_values, main_rows, other_rows, plane_rows
 from .rows import draw_rows, draw_sentence
 
 TAB = "Tactile"
+FACETED = {"facets", "folds"}  # A Subdivision modifier may take these doubts away.
 HELP = "Click on a mesh: a probe feels its surface there and keeps a patch of it with its curvatures"
 OTHER_MODE = "Objects are touched in Object Mode, so the buttons are gray"
-ICONS = {"ok": "CHECKMARK", "uncertain": "ERROR", "not_converged": "ERROR"}
+ICONS = {"ok": "CHECKMARK"}
 
 
 class _Sidebar(PanelMixin):
@@ -178,7 +179,7 @@ def _draw_remedy(layout: bpy.types.UILayout, record: Mapping[str, Any]) -> None:
     """Draws the button that helps a probe's patch which is outdated, or felt few facets."""
     if record["status"] == "outdated":
         layout.operator(TACTILE_OT_update.bl_idname, icon="FILE_REFRESH")
-    elif record.get("few_facets"):
+    elif FACETED.intersection(doubt["code"] for doubt in record["doubts"]):
         layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
 
 
@@ -195,7 +196,7 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         icon = good if record["status"] == "ok" else "ERROR"
         draw_sentence(context, layout, object_verdict(record), icon)
         if words := facets(record):
-            draw_sentence(context, layout, words, "ERROR")
+            draw_sentence(context, layout, words, "INFO")
             layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
         _draw_colors(context, layout, obj, "tactile_colors")
         if patch_record.is_colored(obj):
@@ -237,7 +238,8 @@ def _draw_details(
 ) -> None:
     """Draws what the fit says of itself, and all other numbers, folded away."""
     if body := _folded(layout, "why", "Reasons"):
-        draw_sentence(context, body, record["message"], ICONS.get(record["status"], "ERROR"))
+        for i, words in enumerate(reasons(record)):
+            draw_sentence(context, body, words, "BLANK1" if i else ICONS.get(record["status"], "ERROR"))
     if body := _folded(layout, "numbers", "More Numbers"):
         draw_rows(context, body, other_rows(record, unit), active=record["status"] != "outdated")
 

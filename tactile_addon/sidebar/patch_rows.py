@@ -19,14 +19,14 @@ FLATTEST = 1e-3  # Nor has one whose radius is a thousand times the patch's.
 def main_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     """(label, value) of what matters most, with lengths in a unit of units.py."""
     rim = record.get("height_std_rim")
-    misfit = _said(record, "height_error", 1, unit) if "height_error" in record else "–"
+    deviation = _said(record, "height_error", 1, unit) if "height_error" in record else "–"
     return [
         ("Principal Curvatures", ""),
         ("κ1", _measured(record, "k1", -1, unit)),
         ("κ2", _measured(record, "k2", -1, unit)),
         ("Height", f"± {units.say(record['height_std'], 1, unit)}"),
         ("At the Rim", "…" if rim is None else f"± {units.say(rim, 1, unit)}"),
-        ("Misfit", misfit),
+        ("Deviation", deviation),
     ]
 
 

@@ -183,10 +183,9 @@ class StabilityMap:
         return _reason_of(core.stops_at(contours, point) or shortest.stops)
 
     def _note(self, number: int, touch: core.Exploration) -> None:
-        result, surface = touch.result, self.surface
-        follows_facets = core.has_few_facets(result, surface.face_near, surface.corners_of)
-        self.few_facets += follows_facets
-        is_sure = result.status == "ok" and not follows_facets
+        result = core.with_facets(touch.result, self.surface.face_near, self.surface.corners_of)
+        self.few_facets += result.gravest is not None and result.gravest.code == "facets"
+        is_sure = result.gravest is None
         self.reason[number] = REASON_KEYS.index("patch" if is_sure else "doubt")
         self.measures[number] = (
             NOTHING if result.taps.height is None else result.taps.height,

@@ -87,6 +87,7 @@ def touch(
     more = {"rng": seed, "tangent": axes[:, 0], "tolerance": tolerance, "noise": noise, **fit}
     found = _explored(surface, point, outward, planes, extent, step, **more)
     clock.append(perf_counter())
+    found = replace(found, result=core.with_facets(found.result, surface.face_near, surface.corners_of))
     require_single("patch", found.result.radius, found.result.frame.origin)
     report: TouchReport = {
         "source": obj.name,
@@ -98,7 +99,6 @@ def touch(
             found,
             len(planes),
             ends(found.result.contours, extent > 0.0),
-            core.has_few_facets(found.result, surface.face_near, surface.corners_of),
         ),
         "axes": axes.tolist(),
         "seconds": dict(zip(("prepare", "touch"), np.diff(clock).tolist(), strict=True)),
@@ -141,7 +141,7 @@ def _explored(
         ) from error
 
 
-def _exploration_report(found: core.Exploration, given: int, ended: str, few_facets: bool) -> TouchReport:
+def _exploration_report(found: core.Exploration, given: int, ended: str) -> TouchReport:
     """The report of a touch whose first `given` planes were given; the rest as in `judgment`."""
     added = zip(found.planes[given:], found.stds, found.stds[1:], strict=False)
     # Where vertices are many they would count more, and if faces are large, there may be none in a pocket.
@@ -151,7 +151,7 @@ def _exploration_report(found: core.Exploration, given: int, ended: str, few_fac
         "degree": found.result.patch.degree,
         "extent": found.extent,
         "step": found.step,
-        **reconstruction_report(found.result, ended, few_facets),
+        **reconstruction_report(found.result, ended),
         "planes": [[math.degrees(plane.azimuth), math.degrees(plane.tilt)] for plane in found.planes],
         "added_planes": [
             {"azimuth": math.degrees(plane.azimuth), "height_std_before": before, "height_std": after}

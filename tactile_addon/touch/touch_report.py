@@ -59,7 +59,7 @@ class TouchReport(TypedDict, total=False):
 
     status: str  # See core.Reconstruction.status; "outdated" if the patch is from an earlier touch.
     message: str
-    few_facets: bool  # See core.has_few_facets.
+    doubts: list[dict[str, Any]]  # See core.Doubt.to_dict; the gravest first.
     ended: str  # A sentence on what has ended the curves, which is part of the message.
     is_verified: bool  # Whether the keys are there that take long.
     frame: FrameReport
@@ -132,30 +132,26 @@ def ends(contours: Sequence[core.Contour], has_extent: bool) -> str:
     return f" {', '.join(words)}{', before the extent' if has_extent else ''}."
 
 
-def judgment(result: core.Reconstruction, error: core.MeshError, ended: str, few_facets: bool) -> TouchReport:
-    """Status and message, see core.judged_by_mesh; `ended` is added to the fit's own message.
-
-    few_facets : see core.has_few_facets
+def judgment(result: core.Reconstruction, error: core.MeshError, ended: str) -> TouchReport:
+    """The verdict, see core.doubts_by_mesh; `ended` is added to the fit's own message.
 
     On a crease or an edge a patch may fit one side. A stability map has none there, so it is in doubt.
     """
-    status, message = core.judged_by_mesh(result, error)
-    message += ended if message == result.message else ""
-    stops = core.stops_at(result.contours, result.frame.origin, AT_POINT * result.radius)
-    if status == "ok" and (stops or few_facets):
-        status = "uncertain"
-    if stops:
+    doubts, message = core.doubts_by_mesh(result, error), f"{result.message}{ended}"
+    if stops := core.stops_at(result.contours, result.frame.origin, AT_POINT * result.radius):
         where = core.WHERE[Counter(stops).most_common(1)[0][0]]
-        message = (
-            f"The point is {where}, so half curves end there at once: move the point away from the edge. "
-            f"{message}"
-        )
-    if few_facets:
-        message = (
-            "The curves lie on so few facets that the curvature is that of the facets, not of the shape: "
-            f"add a Subdivision modifier if the mesh stands for a smooth shape. {message}"
-        )
-    return {"status": status, "message": message}
+        doubts = (core.Doubt("at_edge", len(stops), words=(where,)), *doubts)
+    is_own = doubts[:1] == result.doubts[:1]
+    return verdict_report(doubts, message) | ({"message": message} if is_own else {})
+
+
+def verdict_report(doubts: Sequence[core.Doubt], message: str) -> TouchReport:
+    """The verdict with these doubts, the gravest first; the message is for where there is none."""
+    return {
+        "status": core.status_of(next(iter(doubts), None)),
+        "message": str(doubts[0]) if doubts else message,
+        "doubts": [doubt.to_dict() for doubt in doubts],
+    }
 
 
 def suggestion_report(result: core.Reconstruction, reference: Array) -> SuggestedPlane:
@@ -181,14 +177,11 @@ def measures(result: core.Reconstruction) -> TouchReport:
     }
 
 
-def reconstruction_report(
-    result: core.Reconstruction, ended: str = "", few_facets: bool = False
-) -> TouchReport:
+def reconstruction_report(result: core.Reconstruction, ended: str = "") -> TouchReport:
     """The report of a fit before it is compared with a mesh; arguments as in `judgment`."""
     (d1, d2, n), at_point = result.frame.axes.T.tolist(), result.patch.derivatives(0.0, 0.0)
     return {
-        **judgment(result, core.MeshError(None), ended, few_facets),
-        "few_facets": few_facets,
+        **judgment(result, core.MeshError(None), ended),
         "ended": ended,
         "is_verified": False,
         "frame": {"origin": result.frame.origin.tolist(), "d1": d1, "d2": d2, "normal": n},

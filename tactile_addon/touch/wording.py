@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reports of patches as tables and sentences for people, and errors as sentences."""
 
-from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -18,7 +17,6 @@ from .units import Unit, known, length, rounded, say, unit_of
 SPREAD = ("mean", "median", "max", "rms")
 FORMULAS = ("=", "+", "-", "@", "\t", "\r", "\n")  # Spreadsheets run text that begins with one of these.
 ROUNDING = 1e-6  # A component below this share of the largest is what single precision leaves of 0.
-EARLY = ("edge", "crease", "turns away")  # These end a curve early.
 
 
 def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
@@ -65,19 +63,15 @@ def verdict(report: TouchReport, unit: Unit) -> str:
     """A sentence on whether a patch is good, and what to do if it is not."""
     if report["status"] == "outdated":
         return "Outdated: touch again"
-    if report.get("few_facets"):
-        return "Curvature of the facet, not of the shape"
-    if report["status"] != "ok":
-        doubt = report["message"].partition(". ")[0].rstrip(".")
-        return f"Doubtful: {doubt.rpartition(': ')[2]}"
-    stops = Counter(stop for pair in report.get("stops", ()) for stop in pair)
-    ends = ((count, core.WHERE.get(stop, "")) for stop, count in stops.most_common())
-    early = [(count, where) for count, where in ends if where.endswith(EARLY)]
-    if early:
-        count = sum(number for number, _ in early)
-        number = "all" if count == stops.total() else f"{count} of {stops.total()}"
-        return f"Good, with {number} half curves cut short {' or '.join(where for _, where in early)}"
+    if report["doubts"]:
+        return f"Doubtful: {report['doubts'][0]['advice']}"
     return f"Good: heights to ± {say(report['height_std'], 1, unit)}"
+
+
+def reasons(report: Mapping[str, Any]) -> list[str]:
+    """Sentences on what the verdict rests on: the message, and each doubt that is not in it."""
+    others = (f"{doubt['sentence']}: {doubt['advice']}." for doubt in report["doubts"][1:])
+    return [report["message"], *others]
 
 
 def is_flat(report: Mapping[str, Any]) -> bool:

@@ -75,11 +75,9 @@ def agreement(record: Mapping[str, Any]) -> str | None:
         return None
     unit, tolerance = unit_of(record), record["tolerance"]
     share = within(record["within"], record["deviation_max"] <= tolerance)
-    # If it is farther than that, the message says how far.
-    is_far = record["deviation_max"] > OFF_TOLERANCES * tolerance
-    farthest = "" if is_far else f", and the farthest place is {deviation(record, 'max')} off"
     return (
-        f"{share} of the surface is within the tolerance of {units.say(tolerance, 1, unit)}{farthest}. "
+        f"{share} of the surface is within the tolerance of {units.say(tolerance, 1, unit)}, and the "
+        f"farthest place is {deviation(record, 'max')} off. "
         f"Good means at least {100.0 * WITHIN_SHARE:g} % within it, and none farther off than "
         f"{units.say(OFF_TOLERANCES * tolerance, 1, unit)}."
     )
@@ -120,11 +118,11 @@ def object_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("Tolerance", _tolerance(record)),
         ("Height", f"± {units.say(record['height_std'], 1, unit_of(record))}"),
         # Where touches could go on, most of it would be the object that was not felt.
-        ("Off the Mesh", None if record.get("uncovered") else deviation(record, "mean")),
+        ("Deviation", None if record.get("uncovered") else deviation(record, "mean")),
         ("Patches", record["patches"]),
         ("Edge Length", _edge(record)),
         ("Vertices", record["vertices"]),
-        ("… No Curvature", record.get("unknown_curvatures") or None),
+        ("Without Curvature", record.get("unknown_curvatures") or None),
     )
 
 

@@ -14,6 +14,7 @@ from ... import core
 from ...core.arguments import many
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.touch_object import AWAY, nearest_point
+from ..touch.touch_report import verdict_report
 from ..touch.types import Array, Object
 from ..touch.units import length
 from .both_ways import BothWays
@@ -168,9 +169,9 @@ class ObjectTouches:
             self.found.append(r)
             self.rims.append(rim)
             self._area += r.domain.area
-            self._faceted += r.domain.area * core.has_few_facets(
-                r, self.surface.face_near, self.surface.corners_of
-            )
+            on_mesh = core.with_facets(r, self.surface.face_near, self.surface.corners_of)
+            is_of_facets = on_mesh.gravest is not None and on_mesh.gravest.code == "facets"
+            self._faceted += r.domain.area * is_of_facets
             self._left = self._left[~core.covered_by(r, rim, self._left, self.tolerance)]
         self.done, self.uncovered = state.done, state.uncovered
         touches, places = many(state.done, "touch", "touches"), many(state.uncovered, "place", "places")
@@ -178,7 +179,7 @@ class ObjectTouches:
         if state.joining is None:
             self._is_joining = False
             # The last touches may still end when it is stopped.
-            goes_on = f"{touches}, goes on at {places}" if state.uncovered else touches
+            goes_on = f"{touches}, {places} left" if state.uncovered else touches
             self.words = f"Joining {patches}" if self.is_stopped else goes_on
         else:
             self._rounds += not self._is_joining
@@ -243,38 +244,30 @@ class ObjectTouches:
             "seed": self.seed,
             "most": self.most,
         }
-        return found | dict(zip(("status", "message"), self._verdict(found), strict=True))
+        return found | verdict_report(self._doubts(found), found["message"])
 
-    def _verdict(self, found: Mapping[str, Any]) -> tuple[str, str]:
-        """The status and the message of what was found: those of its atlas, unless the mesh explains more."""
-        status, message, unit = found["status"], found["message"], unit_of(found)
-        advice = "use a shorter edge length" if self.edge else "use a smaller tolerance"
-        if found["uncovered"] and self._is_cut_short:
-            places = many(found["uncovered"], "place", "places")
-            return "uncertain", f"Touching was stopped, and the object goes on at {places}: touch it again."
-        if found["uncovered"]:
-            return status, message
-        if self.compared.largest > OFF_TOLERANCES * self.tolerance:
-            off = length(self.compared.largest, unit)
-            if self.surface.has_rims() and not (self.edge and status == "ok"):
-                return "uncertain", (
-                    f"The surface is up to {off} off the object, whose mesh has open edges, as around holes: "
-                    "close them, or use a smaller tolerance."
-                )
-            if status != "ok":
-                return status, f"The surface is up to {off} off the object. {message}"
-            return "uncertain", (
-                f"The surface is up to {off} off the object, which the tolerance does not explain: {advice}."
-            )
-        if status == "ok" and self.compared.within < WITHIN_SHARE:
-            share = within(self.compared.within, False)
-            return "uncertain", f"Only {share} of surface and object agree to the tolerance: {advice}."
-        if status == "ok" and found["height_std"] > self.tolerance:
-            return "uncertain", (
-                f"Heights are accurate to {length(found['height_std'], unit)} on average, and the tolerance "
-                f"is {length(self.tolerance, unit)}: use a larger tolerance."
-            )
-        return status, message
+    def _doubts(self, found: Mapping[str, Any]) -> list[core.Doubt]:
+        """The doubts of its atlas, and what the mesh adds to these, the gravest first."""
+        doubts, unit = self.whole.doubts(), unit_of(found)
+        if count := found["uncovered"]:
+            places = (many(count, "place", "places"),)
+            if not self._is_cut_short:
+                return doubts
+            others = (doubt for doubt in doubts if doubt.code != "cut_short")
+            return [core.Doubt("stopped", count, words=places), *others]
+        off, farthest = self.compared.largest, OFF_TOLERANCES * self.tolerance
+        useless = (core.FINER,) if self.edge else (core.SHORTER_EDGES,)
+        if off > farthest:
+            if self.surface.has_rims() and not (self.edge and not doubts):
+                return [core.Doubt("open_edges", off, farthest, (length(off, unit),)), *doubts]
+            return [*doubts, core.Doubt("off_mesh", off, farthest, (length(off, unit),), useless)]
+        if self.compared.within < WITHIN_SHARE:
+            share = (within(self.compared.within, False),)
+            doubts.append(core.Doubt("share", self.compared.within, WITHIN_SHARE, share, useless))
+        if found["height_std"] > self.tolerance:
+            lengths = length(found["height_std"], unit), length(self.tolerance, unit)
+            doubts.append(core.Doubt("mean_height", found["height_std"], self.tolerance, lengths))
+        return doubts
 
 
 def tolerance_of(size: float, accuracy: str, noise: float) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ... import core
 from ...core.steps import part_of
+from ..touch.touch_report import verdict_report
 from ..touch.types import Array
 
 CURVED_AT_ONCE = 1000  # A step computes the curvatures at this many vertices.
@@ -69,10 +70,8 @@ class WholeSurface:
     def report(self) -> dict[str, Any]:
         """What was found, as a dict of plain values."""
         atlas, mesh = self.atlas, self.mesh
-        status, message = self._verdict()
         return {
-            "status": status,
-            "message": message,
+            **verdict_report(self.doubts(), atlas.message),
             "patches": len(atlas.patches),
             "in_doubt": self._in_doubt,
             "edges": len(atlas.edges),
@@ -85,11 +84,12 @@ class WholeSurface:
             "radius": float(np.median([r.radius for r in atlas.patches])),
         }
 
-    def _verdict(self) -> tuple[str, str]:
-        """The status and the message of the atlas, unless its surface has holes only as it is shown."""
-        if self.atlas.status == "ok" and _rims(self.mesh) > _rims(self.atlas.reference.mesh):
-            return "uncertain", "Triangles of this edge length leave holes: use a shorter edge length."
-        return self.atlas.status, self.atlas.message
+    def doubts(self) -> list[core.Doubt]:
+        """The doubts of the atlas, or that its surface has holes only as it is shown."""
+        doubts = list(self.atlas.doubts)
+        if not doubts and _rims(self.mesh) > _rims(self.atlas.reference.mesh):
+            doubts.append(core.Doubt("holes"))
+        return doubts
 
 
 def _edge(mesh: core.Mesh) -> float:

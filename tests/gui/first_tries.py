@@ -59,12 +59,16 @@ def facets():
     torus = only(bpy.ops.mesh.primitive_torus_add)
     look((0, 0, 0), (1, -1, 1), 5)
     said = yield from header((0.9, -0.86, 0.1))
-    check("while picking, the header has a verdict that is not good", "Curvature of the facet" in said, said)
+    check(
+        "while picking, the header has a verdict that is not good",
+        "Doubtful: add a Subdivision" in said,
+        said,
+    )
     check("... and Esc leaves nothing", probe() is None)
     yield from pick(torus, (0.9, -0.86, 0.05))
     look(probe().matrix_world.translation, (1, -1, 0.6), 1.5)
     yield 1
-    check("a touch of facets is about them", patch()["tactile"]["few_facets"], "")
+    check("a touch of facets is about them", patch()["tactile"]["doubts"][0]["code"] == "facets", "")
     picture("facets")
     bpy.ops.ed.undo_push(message="Picked")
     gui.click(*SUBDIVIDE_BUTTON)
@@ -82,7 +86,7 @@ def facets():
     yield from until(lambda: not bpy.data.objects["Torus"].modifiers)
     yield from until(is_complete)
     check("one Ctrl Z takes it back", not bpy.data.objects["Torus"].modifiers, "")
-    check("... and the verdict with it", patch()["tactile"]["few_facets"], "")
+    check("... and the verdict with it", patch()["tactile"]["doubts"][0]["code"] == "facets", "")
 
 
 def forehead():

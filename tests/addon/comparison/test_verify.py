@@ -169,7 +169,7 @@ def test_the_scenes_unit_is_the_panels(empty, patch, extension):
     rows = dict(addon.comparison.verification_wording.verification_rows(patch["tactile"], unit))
     assert rows["Overlap"] == "100 %"
     farthest = np.abs(values(patch.data, "deviation")).max()
-    assert rows["Patch to Mesh"] == addon.touch.units.say(farthest, 1, unit)
+    assert rows["Largest Deviation"] == addon.touch.units.say(farthest, 1, unit)
 
 
 def test_half_covered_and_nothing_below(empty, patch, capfd):

@@ -31,7 +31,7 @@ def ball(empty):
 
 
 def record(status="ok", message="The patch describes its contacts.", **more):
-    return {"status": status, "message": message, "height_std": 0.0123, **more}
+    return {"status": status, "message": message, "doubts": [], "height_std": 0.0123, **more}
 
 
 def test_a_length_far_below_its_unit_is_in_a_smaller_one(extension):
@@ -77,14 +77,14 @@ def test_the_verdict_says_good_and_how_good(wording):
     assert wording.verdict(blind, UNIT) == "Good: heights to ± 0.0123 mm"
 
 
-def test_the_verdict_says_what_limits_a_good_patch(wording, empty):
+def test_the_reasons_say_what_limits_a_good_patch(wording, empty):
     empty.ops.mesh.primitive_cube_add()
     empty.ops.tactile.pick(target="Cube", location=(0.9, 0.2, 1.0), extent=0.5)
     (patch,) = empty.context.object.children
     words = wording.verdict(patch["tactile"].to_dict(), UNIT)
-    assert words == "Good, with 3 of 6 half curves cut short at a crease"
-    report = patch["tactile"].to_dict() | {"stops": [["crease", "crease"]] * 3}
-    assert wording.verdict(report, UNIT) == "Good, with all half curves cut short at a crease"
+    assert words.startswith("Good: heights to ± ")
+    (reason,) = wording.reasons(patch["tactile"].to_dict())
+    assert reason.endswith(" 3 of 6 half curves ended at a crease, before the extent.")
 
 
 def test_the_deviation_at_the_rim_stands_below_the_mean(said, ball):
@@ -100,8 +100,11 @@ def test_the_verdict_says_what_to_do_where_there_is_doubt(wording, status):
         "Heights are accurate to 5.3 % of the radius on average: use a shorter extent or add sampling planes."
         " These planes cannot show 3 of the 28 ways to bend. All half curves end at a crease."
     )
-    words = wording.verdict(record(status, message), UNIT)
-    assert words == "Doubtful: use a shorter extent or add sampling planes"
+    advice = {"heights": "use a shorter extent or add sampling planes", "gap": "add sampling planes"}
+    doubts = [{"code": code, "sentence": f"The {code}", "advice": words} for code, words in advice.items()]
+    found = record(status, message, doubts=doubts)
+    assert wording.verdict(found, UNIT) == "Doubtful: use a shorter extent or add sampling planes"
+    assert wording.reasons(found) == [message, "The gap: add sampling planes."]
 
 
 def test_the_verdict_on_an_earlier_patch_is_none(wording):
@@ -186,14 +189,14 @@ def test_every_row_says_what_it_is(said, extension, ball):
     addon = extension.tactile_addon
     rows = said.main_rows(report, UNIT) + said.other_rows(report, UNIT) + said.plane_rows(report, UNIT)
     labels = [label for label, value in rows if value] + [
-        "Error on 9 More",
-        "Total |K|",
+        "Error on 9 More Curves",
+        "Total Curvature",
         "Expected Accuracy with It",
     ]
     assert not [
         label for label in labels if not re.match(r"[A-Z1\d].{15,}", addon.sidebar.rows.tip_of(label))
     ]
-    assert addon.sidebar.rows.tip_of("Error on 9 More") != addon.sidebar.rows.tip_of("Error on Curves")
+    assert addon.sidebar.rows.tip_of("Error on 9 More Curves") != addon.sidebar.rows.tip_of("Fit Error")
 
 
 @pytest.mark.long

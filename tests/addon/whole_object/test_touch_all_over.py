@@ -76,7 +76,7 @@ def test_near_the_edges_of_a_cube_curvatures_are_unknown_and_colors_those_of_the
     assert np.abs(values(mesh, "mean_curvature")).max() < 0.01
     assert record["unknown_curvatures"] == unknown.sum() > 0
     rows = dict(extension.tactile_addon.whole_object.object_report.object_rows(record))
-    assert rows["… No Curvature"] == str(unknown.sum())
+    assert rows["Without Curvature"] == str(unknown.sum())
     for shown in ("mean_curvature", "curvedness", "height_std"):
         surface.tactile_colors = shown
         colors = mesh.attributes["curvature_color"]
@@ -143,7 +143,7 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball, extension):
     assert report.object_verdict(record).startswith("Incomplete. The patches end at ")
     assert "allow more touches" in record["message"]
     assert report.object_summary(record) == f"Incomplete: 3 touches; the object goes on at {places}"
-    assert "Off the Mesh" not in rows  # Most of it would be what was not felt.
+    assert "Deviation" not in rows  # Most of it would be what was not felt.
 
 
 def faces_of(bpy, vertices, faces):

@@ -55,10 +55,13 @@ def test_a_cube_is_a_cube_with_sharp_edges(empty, extension):
     rule = "Good means at least 99 % within it, and none farther off than 1.2 cm."
     assert report.object_verdict(record) == f"Good. {OK} {agreement} {rule}"
     assert report.is_all_within(record)
-    assert dict(report.object_rows(record))["Off the Mesh"] == "0 cm"
+    assert dict(report.object_rows(record))["Deviation"] == "0 cm"
     # What is farther off than that is in the message already.
     far = {**record, "deviation_max": 0.05, "within": 0.9}
-    assert report.agreement(far) == f"90 % of the surface is within the tolerance of 0.4 cm. {rule}"
+    words = (
+        f"90 % of the surface is within the tolerance of 0.4 cm, and the farthest place is 5 cm off. {rule}"
+    )
+    assert report.agreement(far) == words
     mesh = surface.data
     ends = np.array([edge.vertices for edge in mesh.edges])[values(mesh, "sharp_edge").astype(bool)]
     at_faces = np.isclose(np.abs(positions(mesh)), 1.0, atol=1e-5).sum(axis=1)
@@ -147,14 +150,16 @@ def test_what_touches_bridge_is_reported(empty, extension, ball, touches_of):
     assert report["message"].endswith(f"{advice} a smaller tolerance.")
     atlas = touches.whole.atlas
     touches.whole.atlas = replace(atlas, tolerance=1e-5)
-    assert touches.report()["message"].endswith(f"off the object. {touches.whole.atlas.message}")
+    report = touches.report()
+    assert report["message"] == touches.whole.atlas.message
+    assert [doubt["code"] for doubt in report["doubts"]] == ["rough", "off_mesh"]
     touches.whole.atlas = atlas
     corners = [tuple(polygon.vertices) for polygon in ball.data.polygons[1:]]
     points = [tuple(vertex.co) for vertex in ball.data.vertices]
     ball.data.clear_geometry()
     ball.data.from_pydata(points, [], corners)
     touches.surface = touches_of(ball).surface
-    open_edges = "whose mesh has open edges, as around holes: close them, or use a smaller tolerance."
+    open_edges = "whose mesh has open edges, as around holes: close them or use a smaller tolerance."
     assert touches.report()["message"].endswith(open_edges)
     touches.edge = 0.5
     assert touches.report()["message"].endswith(f"{advice} a shorter edge length.")
@@ -248,8 +253,8 @@ def test_closed_is_the_mesh_that_is_shown(extension, left_out, shown, uncovered,
         return Mesh(TETRAHEDRON, FACES[left:], np.full(4, 0.1), np.zeros(4, dtype=int))
 
     atlas = SimpleNamespace(
-        status="ok",
         message=OK,
+        doubts=(),
         uncovered=uncovered,
         reference=SimpleNamespace(mesh=mesh(left_out)),
         patches=[SimpleNamespace(radius=1.0)],
@@ -263,7 +268,7 @@ def test_closed_is_the_mesh_that_is_shown(extension, left_out, shown, uncovered,
     assert report["message"] == words
     rows = extension.tactile_addon.whole_object.object_report.object_rows
     shown_rows = dict(rows(report | {"tolerance": 0.1, "uncovered": len(uncovered)}))
-    assert shown_rows["… No Curvature"] == "1"
+    assert shown_rows["Without Curvature"] == "1"
     assert shown_rows["Surface"] == ("Closed" if is_closed else "Incomplete" if uncovered else "Open")
 
 
@@ -288,7 +293,7 @@ def progress_of(touches, core):
             left = left[~core.covered_by(r, rim, left, touches.tolerance)]
         count = len(touches.found)
         steps.append((touches.words.split()[0], touches.share, 1.0 - len(left) / 1000))
-        assert "goes on at 0" not in touches.words
+        assert ", 0 places left" not in touches.words
     words, shares, felt = zip(*steps, strict=True)
     touching = words.index("Meshing")
     assert (np.array(shares[:touching]) <= 0.8 * np.array(felt[:touching]) + 1e-9).all()
@@ -349,6 +354,10 @@ def test_who_stops_it_gets_no_advice_to_allow_more_touches(ball, touches_of):
     report = touches.report()
     places = f"{report['uncovered']} places"
     assert report["message"] == f"Touching was stopped, and the object goes on at {places}: touch it again."
+    again = touches_of(ball, tolerance=0.02)
+    for _ in again.steps():
+        pass
+    assert not again.report()["doubts"]
 
 
 @pytest.mark.long
@@ -361,6 +370,9 @@ def test_there_is_no_tick_where_heights_are_worse_than_the_tolerance(extension, 
     touches.whole.mesh = mesh._replace(std=mesh.std + touches.tolerance)
     report = touches.report()
     assert report["message"].startswith("Heights are accurate to ")
+    assert report["message"].endswith("use a larger tolerance.")
+    touches.tolerance *= 2.0
+    assert "mean_height" not in {doubt["code"] for doubt in touches.report()["doubts"]}
     assert extension.tactile_addon.whole_object.object_report.verdict_of(report) == "Doubtful"
 
 

@@ -59,7 +59,7 @@ def test_an_automatic_touch_between_folds_stays_on_its_face(turn):
 def test_a_touch_across_folds_names_them():
     (r,) = touches(20, 1, 2, extent=1.0)
     assert r.message.startswith("The surface turns at only one or two places along a curve")
-    assert "use a shorter extent, or make the facets finer" in r.message
+    assert "use a shorter extent, move the point away from folds, or make the facets finer" in r.message
 
 
 def contour(angles, steps):

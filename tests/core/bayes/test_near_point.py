@@ -30,7 +30,7 @@ def test_a_touch_across_the_tip_of_a_cone_is_in_doubt_and_a_shorter_one_is_right
     assert wide.status == "uncertain"
     assert wide.message.startswith(
         "The contacts near the point bend otherwise than the patch, as beside a tip or a fold within it: "
-        "use a shorter extent."
+        "use a shorter extent or move the point away from it."
     )
     short = core.explore(surface, surface.point, surface.normal, planes, extent=0.3 * away).result
     assert short.status == "ok"

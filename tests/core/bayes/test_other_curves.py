@@ -65,7 +65,7 @@ def test_the_message_says_how_far_the_curve_is_off():
         np.median(2.0 * np.abs(z[np.abs(x) > 0.5 * np.abs(x).max()])) / r.radius, rel=0.1
     )
     assert f"A curve is {100.0 * off:.2g} % of the radius off" in r.message
-    assert f"{deviations:.0f} times the deviation" in r.message
+    assert f"whose deviations explain {700.0 * off / deviations:.2g} %" in r.message
 
 
 def test_strokes_tell_it_among_three_curves():

@@ -171,12 +171,12 @@ def test_the_area_without_surface_is_missing(flat, start, share, side):
 
 
 def test_a_patch_is_in_doubt_where_there_is_no_mesh(flat):
-    assert core.judged_by_mesh(flat, core.MeshError(0.0, DOUBTFUL_GAP)) == (flat.status, flat.message)
+    assert core.doubts_by_mesh(flat, core.MeshError(0.0, DOUBTFUL_GAP)) == ()
     error = core.mesh_error(flat, HalfPlane(-0.5))
-    assert core.judged_by_mesh(flat, error) == (
-        "uncertain",
+    (doubt,) = core.doubts_by_mesh(flat, error)
+    assert str(doubt) == (
         f"At {100.0 * error.missing:.0f} % of the patch there is no surface, which ends or has a hole "
-        "between the curves: use a shorter extent or add sampling planes.",
+        "between the curves: use a shorter extent or add sampling planes."
     )
 
 
@@ -193,9 +193,9 @@ def test_it_is_the_mean_over_the_domain_of_what_the_fit_misses():
 
 def test_a_mesh_contradicts_a_fit_without_doubt_where_it_is_beyond_its_deviation(flat):
     std = flat.mean_height_std
-    assert core.judged_by_mesh(flat, core.MeshError(CONTRADICTING * std)) == (flat.status, flat.message)
-    status, message = core.judged_by_mesh(flat, core.MeshError(1.01 * CONTRADICTING * std))
-    assert (flat.status, status) == ("ok", "uncertain")
-    assert message.startswith("The mesh is ") and message.endswith(
+    assert core.doubts_by_mesh(flat, core.MeshError(CONTRADICTING * std)) == ()
+    (doubt,) = core.doubts_by_mesh(flat, core.MeshError(1.01 * CONTRADICTING * std))
+    assert (flat.status, core.status_of(doubt)) == ("ok", "uncertain")
+    assert str(doubt).startswith("The mesh is ") and str(doubt).endswith(
         "use a shorter extent or add sampling planes."
     )

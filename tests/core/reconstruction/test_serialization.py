@@ -3,6 +3,7 @@
 """A reconstruction as plain values and back."""
 
 import json
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -27,6 +28,7 @@ def touched(noise=0.05, **options):
 
 RESULTS = [touched(method=method) for method in METHODS]
 RESULTS += [touched(degree=2), touched(degree=6), touched(noise=1.0), touched(degree="auto")]
+RESULTS += [replace(RESULTS[0], shape_curvatures=np.array([[-0.5, 0.1], [-0.4, 0.2]]))]
 
 
 @pytest.mark.parametrize("r", RESULTS)
@@ -80,7 +82,7 @@ def damaged(path, value):
     return d
 
 
-KEYS = sorted(set(to_dict(RESULTS[0])) - {"status", "message"})
+KEYS = sorted(set(to_dict(RESULTS[0])) - {"status", "message", "doubts"})
 
 
 VALUES = [None, "ball", float("nan"), [], {}, [[1.0]], [{}], -1]

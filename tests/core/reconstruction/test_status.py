@@ -116,7 +116,7 @@ def test_curves_that_bend_at_a_point_of_their_own_get_no_advice_to_meet_elsewher
     assert re.match(
         r"Curve \d bends so sharply at the point that its fit is \S+ % of the radius off", message
     )
-    assert "move the point away from edges, or make the facets finer" in message
+    assert "move the point away from edges or make the facets finer" in message
 
 
 @pytest.mark.parametrize("share", [0.01, 0.1, 0.3])
