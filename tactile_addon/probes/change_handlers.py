@@ -48,12 +48,10 @@ def _bring_up_to_date(depsgraph: bpy.types.Depsgraph, dearest: float) -> None:
     """Touches again if the last touch took at most `dearest` seconds; other patches say "outdated"."""
     global _unsure
     something_happened()
-    if not (targets() or deleted.contour_owners or _unsure):
+    if not (targets() or _unsure):
         return
     if depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
         return
-    if _unsure or _has_come_or_gone(depsgraph):
-        deleted.look_for_contours()
     if not targets():
         _unsure = False
         return

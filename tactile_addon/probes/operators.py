@@ -155,7 +155,7 @@ def has_target(operator: type[Any], context: bpy.types.Context) -> bool:
 
 
 def has_patch(operator: type[Any], context: bpy.types.Context, hint: str) -> bool:
-    """Whether the active object is a patch, its probe or its contours; if not, the poll gives a hint."""
+    """Whether the active object is a patch or its probe; if not, the poll gives a hint."""
     return polls(operator, patch_near(context.view_layer.objects.active), hint)
 
 

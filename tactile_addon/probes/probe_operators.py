@@ -34,7 +34,7 @@ MOST_FACES = 500_000  # as long as it has no more faces then.
 
 
 class _ProbeOperator(OperatorMixin):
-    """For operators on the active probe, or on that of the active patch or contours, to inherit."""
+    """For operators on the active probe, or on that of the active patch, to inherit."""
 
     bl_options = {"REGISTER", "UNDO"}
 
@@ -207,7 +207,7 @@ def _subdivide(target: Object) -> None:
 
 
 class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
-    """Delete the probe with its patch and contours; the mesh that was touched stays"""
+    """Delete the probe with its patch; the mesh that was touched stays"""
 
     bl_idname = "tactile.delete"
     bl_label = "Delete Probe and Patch"
@@ -216,7 +216,7 @@ class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
         found = probe.probe_of(context.view_layer.objects.active)
         target = found.tactile_probe.target
         patch = probe.patch_of(found)
-        patch_object.remove_objects([*patch_record.parts_of(patch), found])
+        patch_object.remove_objects([obj for obj in (patch, found) if obj is not None])
         shown.share_ranges()
         if target is not None:  # What comes next, as another pick, is about it.
             make_active(context, target)

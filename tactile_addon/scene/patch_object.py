@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reconstruction as objects of the scene: the patch, and the tracked contours."""
+"""The reconstruction as an object of the scene: the patch."""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -13,19 +13,15 @@ from ... import core
 from ..touch.touch_object import Touched
 from ..touch.types import Array, Object
 from .attributes import COLOR, DEVIATION, GAUSSIAN_STD, HEIGHT_STD, NORMAL, PLACE, POSITION
-from .contour_mesh import fill_contours
+from .curves import CURVES, curves_of
 from .family import add
 from .mesh_data import ABOVE, emission, fill, own_mesh, values, write
 from .patch_record import (
-    CONTOURS,
     QUANTITIES_OF_A_FIT,
     RECONSTRUCTION,
     RECORD,
     VERDICT,
-    _place_contours,
-    contours_of,
     matrix_of,
-    parts_of,
     place,
 )
 from .shown import recolor, settle
@@ -33,40 +29,25 @@ from .undo import note_added
 from .viewports import show_colors
 
 COLLECTION = "Tactile Patches"
-CONTOUR_COLOR = (0.02, 0.02, 0.02, 1.0)
 # It is drawn above the mesh by as much as it may be below it: by these shares of its radius at least and at
 # most, and by this multiple of its height's deviation until it is compared with the mesh.
 DRAWN_ABOVE, MOST_ABOVE, DEVIATIONS = 5e-3, 0.12, 3.0
 STEEP = 1.7  # Where a patch is steep, it has to go up by more, by this factor.
 
 
-def insert(
-    scene: bpy.types.Scene, touched: Touched, parent: Object | None = None, lines: Object | None = None
-) -> Object:
-    """Adds a patch and its contours to `scene`, in a collection of their own, and returns the patch object.
-
-    lines : an object of contours that has lost its patch, to be used for this one
-    """
-    name = touched.report["source"]
-    patch = _new(scene, f"{name} Patch", emission("Tactile Curvature", attribute=COLOR, upright=True))
-    lines = lines or _new(
-        scene, f"{name} Contours", emission("Tactile Contour", color=CONTOUR_COLOR, upright=True)
-    )
-    patch.parent, lines.parent, lines[CONTOURS] = parent, patch, True
-    for obj in (patch, lines):
-        add(obj)
+def insert(scene: bpy.types.Scene, touched: Touched, parent: Object | None = None) -> Object:
+    """Adds a patch to `scene`, in a collection of its own, and returns the patch object."""
+    name = f"{touched.report['source']} Patch"
+    patch: Object = bpy.data.objects.new(name, bpy.data.meshes.new(name))
+    patch.show_in_front = True  # It would lie in the surface it describes.
+    collection(scene).objects.link(patch)
+    patch.data.materials.append(emission("Tactile Curvature", attribute=COLOR, upright=True))
+    note_added(patch)
+    patch.parent = parent
+    add(patch)
     rewrite(patch, touched)
     show_colors()
     return patch
-
-
-def _new(scene: bpy.types.Scene, name: str, material: bpy.types.Material) -> Object:
-    obj: Object = bpy.data.objects.new(name, bpy.data.meshes.new(name))
-    obj.show_in_front = True  # It would lie in the surface it describes.
-    collection(scene).objects.link(obj)
-    obj.data.materials.append(material)
-    note_added(obj)
-    return obj
 
 
 def remove_objects(objects: Sequence[Object]) -> None:
@@ -86,23 +67,16 @@ def remove_meshes(meshes: Iterable[bpy.types.Mesh]) -> None:
 
 
 def rewrite(patch: Object, touched: Touched) -> None:
-    """Changes the patch, and its contours if they are still there, to those of another touch, in place."""
-    lines = contours_of(patch)
-    for obj in parts_of(patch):
-        own_mesh(obj)
+    """Changes the patch to that of another touch, in place."""
+    own_mesh(patch)
     if touched.report["is_verified"] or PLACE not in patch.data.attributes:
         _fill_patch(patch, touched)
     else:
         _follow(patch, touched)
-    names = {"patch": patch.name}
-    if lines is not None:
-        fill_contours(lines.data, touched)
-        _place_contours(lines)
-        names["contours"] = lines.name
+    patch[CURVES] = curves_of(touched.result)
     place(patch, Matrix(matrix_of(touched.result.frame.axes, touched.result.frame.origin).tolist()))
-    for obj in parts_of(patch):
-        obj[ABOVE] = _above(patch, touched)
-    patch[RECORD] = touched.report | names
+    patch[ABOVE] = _above(patch, touched)
+    patch[RECORD] = touched.report | {"patch": patch.name}
     patch.pop(RECONSTRUCTION, None)
     patch.pop(VERDICT, None)
     recolor(patch)
@@ -112,16 +86,11 @@ def rewrite(patch: Object, touched: Touched) -> None:
 
 
 def _above(patch: Object, touched: Touched) -> float:
-    """How far above the mesh a patch and its contours are drawn where they would lie in it."""
+    """How far above the mesh a patch is drawn where it would lie in it."""
     radius, deepest = touched.result.radius, DEVIATIONS * touched.report["height_std"]
     if touched.report["is_verified"] and touched.surface is not None:
         deepest = max(deepest, -STEEP * float(values(patch.data, DEVIATION).min()))
     return min(max(deepest, DRAWN_ABOVE * radius), MOST_ABOVE * radius)
-
-
-def meshes(patch: Object | None) -> list[bpy.types.Mesh]:
-    """The meshes of a patch object and of its contours; an empty list if `patch` is None."""
-    return [obj.data for obj in parts_of(patch)]
 
 
 def collection(scene: bpy.types.Scene) -> bpy.types.Collection:

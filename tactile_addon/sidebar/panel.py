@@ -268,8 +268,8 @@ def _draw_shown(layout: bpy.types.UILayout, found: Object | None, patch: Object)
     """Draws the switches of what is shown with a patch and may hide it."""
     row = layout.row(align=True)
     row.use_property_split = False
-    if patch_record.contours_of(patch) is not None:
-        row.prop(patch, "tactile_contours", icon="CURVE_DATA", toggle=1)
+    row.prop(patch, "tactile_contours", icon="CURVE_DATA", toggle=1)
+    row.prop(patch, "tactile_directions", icon="EMPTY_AXIS", toggle=1)
     if found is not None:
         row.prop(found.tactile_probe, "show_handles", icon="GIZMO", toggle=1)
 

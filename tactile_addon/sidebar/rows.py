@@ -12,7 +12,8 @@ import bpy
 from bpy.props import StringProperty
 
 from ..touch.types import Outcome
-from ..viewport.overlay import FONT, TEXT
+from ..viewport.curves import FONT
+from ..viewport.overlay import TEXT
 
 # About the width of a letter, and what is free around a text, in pixels at scale 1.
 LETTER, PADDING = 6.5, 12.0

@@ -199,7 +199,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
 
 
 def shown_probe(context: bpy.types.Context) -> Object | None:
-    """The probe whose handles are shown: the active one, or that of the active patch or contours; or None."""
+    """The probe whose handles are shown: the active one, or that of the active patch; or None."""
     found = probe.probe_of(context.object)
     if found is None or not found.visible_get() or probe.lock_of(found) is not None:
         return None

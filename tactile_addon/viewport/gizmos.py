@@ -11,9 +11,9 @@ from mathutils import Matrix, Vector
 
 from ..probes import probe
 from ..touch.touch_object import plane_axes
+from .curves import PLANE_COLORS
 from .drag import DRAG_EXTENT, DRAG_TILT, DRAG_TURN, POINT, STEEP, shown_probe
 from .free_view import is_free
-from .overlay import PLANE_COLORS
 
 HANDLE_REACH = 1.15  # Handles that turn planes are this many extents away from the point,
 UPRIGHT = 0.75  # and those that tilt planes this many extents above it,
