@@ -218,12 +218,7 @@ def make(context: bpy.types.Context, target: Object) -> Object:
 
 def _show(obj: Object) -> None:
     """Colors a patch by the quantity it is set to show now, without the range of the one before."""
-    obj.pop(patch_record.RANGE, None)
-    obj.pop(patch_record.COMMON_RANGE, None)
-    if obj.is_editable and patch_record.is_colored(obj):  # If not, verifying and exporting say so.
-        shown.recolor(obj)
-        if patch_record.RECORD in obj:
-            shown.share_ranges()
+    shown.set_range(obj, 0.0)
 
 
 def _found(probe: Object, name: str) -> float:

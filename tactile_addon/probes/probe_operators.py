@@ -9,8 +9,7 @@ from typing import Any
 import bpy
 from bpy.props import IntProperty
 
-from ...core.arguments import many
-from ..scene import color_range, patch_object, patch_record, shown
+from ..scene import patch_object, patch_record
 from ..scene.viewports import show_colors, shows_colors
 from ..touch import units
 from ..touch.settings import MOST_PLANES, length_property
@@ -18,7 +17,6 @@ from ..touch.types import Object, OperatorMixin, Outcome
 from ..touch.wording import added_planes, verdict
 from . import probe, touch_again
 from .operators import (
-    has_patch,
     is_in_object_mode,
     is_unlocked,
     make_active,
@@ -217,7 +215,6 @@ class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
         target = found.tactile_probe.target
         patch = probe.patch_of(found)
         patch_object.remove_objects([obj for obj in (patch, found) if obj is not None])
-        shown.share_ranges()
         if target is not None:  # What comes next, as another pick, is about it.
             make_active(context, target)
         return {"FINISHED"}
@@ -243,23 +240,6 @@ class TACTILE_OT_show_colors(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class TACTILE_OT_share_range(bpy.types.Operator):
-    """Have all patches that show the same as this one use one range of colors, which suits all of them"""
-
-    bl_idname = "tactile.share_range"
-    bl_label = "Same Range for All Patches"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return has_patch(cls, context, "Select a patch, or its probe")
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        patch = probe.patch_near(context.view_layer.objects.active)
-        count = color_range.share(patch, context.view_layer.objects)
-        return report_done(self, f"One range of colors for {many(count, 'patch', 'patches')}")
-
-
 OPERATORS = (
     TACTILE_OT_add_plane,
     TACTILE_OT_add_planes,
@@ -268,5 +248,4 @@ OPERATORS = (
     TACTILE_OT_add_subdivision,
     TACTILE_OT_delete,
     TACTILE_OT_show_colors,
-    TACTILE_OT_share_range,
 )

@@ -24,7 +24,7 @@ from .patch_record import (
     matrix_of,
     place,
 )
-from .shown import recolor, settle
+from .shown import recolor, share
 from .undo import note_added
 from .viewports import show_colors
 
@@ -82,7 +82,7 @@ def rewrite(patch: Object, touched: Touched) -> None:
     recolor(patch)
     if touched.report["is_verified"]:
         patch[RECONSTRUCTION] = json.dumps(core.to_dict(touched.result), allow_nan=False)
-        settle(patch)
+        share(patch)
 
 
 def _above(patch: Object, touched: Touched) -> float:
@@ -144,8 +144,6 @@ def _follow(obj: Object, touched: Touched) -> None:
     write(mesh, NORMAL, d.normal)
     if obj.tactile_colors in QUANTITIES_OF_A_FIT:
         write(mesh, obj.tactile_colors, _shown(obj.tactile_colors, result, points))
-    if obj.tactile_colors == "gaussian_curvature":
-        write(mesh, GAUSSIAN_STD, core.gaussian_curvature_stds(result, *plane.T))
 
 
 def _shown(name: str, result: core.Reconstruction, points: Array) -> Array:

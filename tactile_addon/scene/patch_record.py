@@ -20,14 +20,15 @@ RECORD = "tactile"  # The report of a patch.
 RECONSTRUCTION = "tactile_reconstruction"  # Its core.to_dict as JSON, once a gesture has ended.
 VERDICT = "tactile_verdict"  # Its status and message, while the report says that it is outdated.
 RANGE = "tactile_color_range"  # The range of its colors, if that is given.
-COMMON_RANGE = "tactile_common_range"  # The range that suits all patches of its mesh.
+COMMON_RANGE = "tactile_common_range"  # That of curvatures on all patches of its mesh, in 1/length.
 MAP_RECORD = "tactile_map"  # The report of a stability map.
 ATLAS_RECORD = "tactile_object"  # The report of a whole object.
 GRAPH = "tactile_graph"  # The graph of a whole object, core.Atlas.to_dict as JSON.
-# What the colors can show: attribute, name, description, and the power of length in its unit.
+# What the colors can show: attribute, name, description, and the power of length in its unit. The first is
+# shown at first: of all it alone differs between flat, rolled, round and hollow surfaces.
 QUANTITIES = [
-    ("gaussian_curvature", "Gaussian Curvature", "K: red on domes and bowls, blue on saddles", -2),
     ("mean_curvature", "Mean Curvature", "H: blue where the surface bulges outward, red where inward", -1),
+    ("gaussian_curvature", "Gaussian Curvature", "K: red on domes and bowls, blue on saddles", -2),
     (
         "shape_index",
         "Shape Index",

@@ -18,12 +18,11 @@ from ..probes.probe_operators import (
     TACTILE_OT_add_subdivision,
     TACTILE_OT_delete,
     TACTILE_OT_remove_plane,
-    TACTILE_OT_share_range,
     TACTILE_OT_show_colors,
     TACTILE_OT_update,
 )
 from ..scene import patch_record
-from ..scene.color_range import range_field, unit_of_range
+from ..scene.shown import unit_of_range
 from ..scene.viewports import shows_colors
 from ..stability_map.map_operator import TACTILE_OT_stability_map
 from ..stability_map.map_report import facets as map_facets
@@ -250,18 +249,12 @@ def _draw_colors(context: bpy.types.Context, layout: bpy.types.UILayout, obj: Ob
 
 
 def _draw_range(context: bpy.types.Context, layout: bpy.types.UILayout, patch: Object) -> None:
-    """Draws where the colors end, and a button for one range on all patches."""
-    row = layout.row(align=True)
+    """Draws where the colors end."""
+    row = layout.row()
     row.use_property_split = False
-    power, unit = unit_of_range(patch, context.scene)
-    shown, factor = range_field(patch)
     name = iface("Range" if patch_record.RANGE in patch else "Range (Auto)")
-    symbol = units.symbol(power, unit)
-    if factor:
-        symbol = f"{factor}{symbol[1:]}" if symbol.startswith("1/") else f"{factor} {symbol}"
-    row.prop(patch, shown, text=f"{name} {symbol}".rstrip(), translate=False)
-    if patch_record.RECORD in patch:
-        row.operator(TACTILE_OT_share_range.bl_idname, text="", icon="LINKED")
+    symbol = units.symbol(*unit_of_range(patch, context.scene))
+    row.prop(patch, "tactile_range", text=f"{name} {symbol}".rstrip(), translate=False)
 
 
 def _draw_shown(layout: bpy.types.UILayout, found: Object | None, patch: Object) -> None:

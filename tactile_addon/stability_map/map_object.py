@@ -14,7 +14,7 @@ from ... import core
 from ..scene import colors, patch_object, patch_record
 from ..scene.attributes import CORNERS, HEIGHT_STD, MAP_COLOR, MEASURES, REASON, TOUCH
 from ..scene.mesh_data import ABOVE, emission, write
-from ..scene.shown import LEAST_RANGE
+from ..scene.shown import LEAST_LENGTH
 from ..scene.viewports import show_colors
 from ..touch.arrays import read_array
 from ..touch.settings import MOST_PLANES
@@ -136,7 +136,7 @@ def _least_range(painted: Object, shown: str) -> float:
     """The smallest range of colors of a quantity, so that red stands for what is bad."""
     if shown in LOGARITHMIC:
         return 10.0
-    least = LEAST_RANGE * painted[patch_record.MAP_RECORD]["spacing"]
+    least = LEAST_LENGTH * painted[patch_record.MAP_RECORD]["spacing"]
     times, other = DOUBTFUL.get(shown, (0.0, shown))
     values = np.array(painted[VALUES][other])
     order = np.argsort(values)

@@ -41,8 +41,8 @@ def draw_curves() -> None:
         return
     gpu.state.depth_test_set("NONE" if is_solid else "LESS_EQUAL")
     gpu.state.depth_mask_set(False)  # A curve would hide parts of its own outline.
-    pushed = cast(Any, gpu.matrix.push_pop())  # which the stubs make no context
     for obj in shown:
+        pushed = cast(Any, gpu.matrix.push_pop())  # which the stubs make no context
         lift = Matrix.Translation((0.0, 0.0, 0.0 if is_solid else obj.get(ABOVE, 0.0)))
         with pushed:
             gpu.matrix.load_matrix(_nearer(context.region_data) @ gpu.matrix.get_model_view_matrix())
