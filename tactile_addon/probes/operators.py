@@ -13,7 +13,6 @@ from ..touch.settings import UNSAVED, PlacedTouch, draw_all, given, length_prope
 from ..touch.touch_object import completed, touch
 from ..touch.types import Object, Outcome
 from ..touch.wording import fit_summary, sentence
-from .number_fields import fields
 from .probe import is_result, lock_of, patch_near, probe_of, record_of
 
 NO_MESH = "There is no mesh to touch: add one (Shift A), or import a scan (File > Import)"
@@ -102,14 +101,6 @@ def surface_of(context: bpy.types.Context) -> Object | None:
     """The active object if it is a whole object, or None."""
     obj: Object = context.view_layer.objects.active
     return obj if obj is not None and patch_record.ATLAS_RECORD in obj else None
-
-
-def fields_of(context: bpy.types.Context, name: str) -> dict[str, str]:
-    """The properties by which an operator shows lengths for the object it touches, see number_fields."""
-    try:
-        return fields(max(target_object(context, name).dimensions))
-    except ValueError:
-        return fields(1.0)
 
 
 @contextmanager

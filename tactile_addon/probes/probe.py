@@ -27,9 +27,6 @@ may differ afterward.
                      and touches then if there was no time before
 """
 
-from collections.abc import Mapping
-from typing import Any
-
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -43,10 +40,10 @@ from bpy.props import (
 from ... import core
 from ..scene import patch_object, patch_record, shown
 from ..scene.family import all_objects, children_of
-from ..touch.settings import OVERRIDABLE, FitSettings, TouchSettings, changed, is_silent
+from ..touch.settings import OVERRIDABLE, TouchSettings, changed, is_silent
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object
-from . import anchor, number_fields
+from . import anchor
 
 DIGEST = "tactile_digest"
 
@@ -221,12 +218,6 @@ def _show(obj: Object) -> None:
     shown.set_range(obj, 0.0)
 
 
-def _found(probe: Object, name: str) -> float:
-    """The value that the last touch chose for a number that is 0."""
-    record: Mapping[str, Any] | None = record_of(probe)
-    return 0.0 if record is None or name == "noise" else record.get(name, 0.0)
-
-
 # Properties of objects, by name.
 PROPERTIES = {
     "tactile_probe": PointerProperty(type=TactileProbe, override=OVERRIDABLE),
@@ -258,10 +249,6 @@ PROPERTIES = {
 
 def register() -> None:
     """Registers the settings of probes, which PROPERTIES need."""
-    TactileProbe.__annotations__.update(number_fields.annotations(TactileProbe, _found))
-    TactileProbe.__annotations__["degree_shown"] = number_fields.degree_field(
-        FitSettings.__annotations__["degree"].keywords, _found
-    )
     bpy.utils.register_class(TactileProbe)
 
 

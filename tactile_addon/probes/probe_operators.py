@@ -12,7 +12,7 @@ from bpy.props import IntProperty
 from ..scene import patch_object, patch_record
 from ..scene.viewports import show_colors, shows_colors
 from ..touch import units
-from ..touch.settings import MOST_PLANES, length_property
+from ..touch.settings import MOST_PLANES, length_property, silent
 from ..touch.types import Object, OperatorMixin, Outcome
 from ..touch.wording import added_planes, verdict
 from . import probe, touch_again
@@ -68,13 +68,12 @@ class TACTILE_OT_add_plane(_PlaneOperator, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
         record, settings = probe.record_of(found) or {}, found.tactile_probe
-        settings.is_probe = False  # The changes below must not make it touch again each time.
-        # A touch that chose its lengths anew would not be the one whose deviation was promised.
-        for name in ("extent", "step"):
-            setattr(settings, name, getattr(settings, name) or record.get(name, 0.0))
-        _add(settings, record.get("suggested_plane"))
-        settings.is_probe = True
-        touch_again.refresh(found, context)
+        with silent():
+            # A touch that chose its lengths anew would not be the one whose deviation was promised.
+            for name in ("extent", "step"):
+                setattr(settings, name, getattr(settings, name) or record.get(name, 0.0))
+            _add(settings, record.get("suggested_plane"))
+            touch_again.refresh(found, context)
         return {"FINISHED"}
 
 
@@ -96,11 +95,10 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
         except ValueError as error:
             return report_error(self, error)
         settings = found.tactile_probe
-        settings.is_probe = False  # The changes below must not make it touch again each time.
-        for plane in touched.report["added_planes"]:
-            _add(settings, plane)
-        touch_again.adopt(found, touched, depsgraph, complete=True)
-        settings.is_probe = True
+        with silent():
+            for plane in touched.report["added_planes"]:
+                _add(settings, plane)
+            touch_again.adopt(found, touched, depsgraph, complete=True)
         unit = units.unit_of(context.scene, touched.result.radius)
         return report_done(self, added_planes(touched.report, unit))
 
@@ -136,12 +134,13 @@ class TACTILE_OT_remove_plane(_PlaneOperator, bpy.types.Operator):
             return report_error(
                 self, ValueError(f"There are {count} planes, 0 to {count - 1}: choose one of them")
             )
-        for name in ("azimuths", "tilts"):
-            values = list(getattr(settings, name))
-            values.append(values.pop(self.plane))
-            setattr(settings, name, values)
-        settings.plane_count -= 1
-        touch_again.refresh(found, context)
+        with silent():
+            for name in ("azimuths", "tilts"):
+                values = list(getattr(settings, name))
+                values.append(values.pop(self.plane))
+                setattr(settings, name, values)
+            settings.plane_count -= 1
+            touch_again.refresh(found, context)
         return {"FINISHED"}
 
 

@@ -66,7 +66,7 @@ def _automatic_range(obj: Object, record: Mapping[str, Any], shown: str) -> floa
 def bend_range(bends: ArrayLike, areas: ArrayLike, size: float) -> float:
     """The range of the curvatures of an object of this size, by those (n,) of parts with areas (n,).
 
-    It follows from their root mean square, so that neither a few narrow bends nor large flat faces decide alone.
+    It follows from their root mean square: neither a few narrow bends nor large flat faces decide alone.
     """
     areas = np.asarray(areas)
     mean = math.sqrt(float(np.sum(areas * np.square(bends)) / areas.sum())) if areas.size else 0.0

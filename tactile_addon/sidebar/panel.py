@@ -11,7 +11,7 @@ from bpy.app.translations import pgettext_iface as iface
 from ..comparison.register_operator import TACTILE_OT_register
 from ..comparison.verification_wording import verification_rows, verification_table
 from ..comparison.verify_operator import TACTILE_OT_verify
-from ..probes import number_fields, probe
+from ..probes import probe
 from ..probes.operators import NO_MESH
 from ..probes.probe_operators import (
     TACTILE_OT_add_plane,
@@ -28,8 +28,7 @@ from ..stability_map.map_operator import TACTILE_OT_stability_map
 from ..stability_map.map_report import facets as map_facets
 from ..stability_map.map_report import map_rows, median_rows
 from ..touch import units
-from ..touch.settings import draw_chosen, draw_sensor, draw_solver
-from ..touch.touch_report import TouchReport
+from ..touch.settings import draw_chosen, draw_fit
 from ..touch.types import Object, PanelMixin
 from ..touch.units import Unit
 from ..touch.wording import registration_summary, verdict
@@ -80,17 +79,13 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         settings, record = found.tactile_probe, probe.record_of(found)
         layout.prop(settings, "target")
         chosen = found_values(record, context.scene)
-        fields = {}  # The override of a library's probe keeps numbers, but not the properties that show them.
-        if found.override_library is None:
-            fields = number_fields.fields(_size_of(settings.target, record)) | {"degree": "degree_shown"}
-        draw_chosen(layout, settings, "extent", chosen, fields)
+        draw_chosen(layout, settings, "extent", chosen)
         _draw_planes(layout, settings)
         row = layout.row()
         row.prop(settings, "live", text="Live" if settings.live else "Live (Frozen)")
         row.operator(TACTILE_OT_update.bl_idname, text="", icon="FILE_REFRESH")
-        for identifier, title, draw in (("sensor", "Sensor", draw_sensor), ("solver", "Fit", draw_solver)):
-            if body := _folded(layout, identifier, title):
-                draw(body, settings, chosen, fields)
+        if body := _folded(layout, "fit", "Sensor and Fit"):
+            draw_fit(body, settings, chosen)
 
 
 def _folded(layout: bpy.types.UILayout, identifier: str, title: str) -> bpy.types.UILayout | None:
@@ -107,12 +102,6 @@ def _draw_pick(context: bpy.types.Context, layout: bpy.types.UILayout, obj: Obje
         draw_sentence(context, layout, NO_MESH, "INFO")
     elif obj is None or not probe.is_result(obj):
         draw_sentence(context, layout, HELP, "INFO")
-
-
-def _size_of(target: Object | None, record: TouchReport | None) -> float:
-    if target is not None:
-        return max(target.dimensions)
-    return 0.0 if record is None else record["radius"]
 
 
 def _draw_planes(layout: bpy.types.UILayout, settings: Any) -> None:

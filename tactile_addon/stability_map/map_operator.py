@@ -7,7 +7,6 @@ import bpy
 from ...core.arguments import many
 from ..probes import probe
 from ..probes.in_slices import AllOver, Progress
-from ..probes.number_fields import dragged
 from ..probes.operators import (
     has_target,
     is_in_object_mode,
@@ -19,8 +18,8 @@ from ..scene import patch_record
 from ..touch.settings import (
     NAMES,
     TouchSettings,
-    draw_all,
     draw_chosen,
+    draw_noise,
     length_property,
     touch_arguments,
 )
@@ -30,7 +29,6 @@ from .map_report import map_summary
 from .stability import StabilityMap, expected_count
 
 
-@dragged
 class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
     """Touch a mesh all over and paint a copy of it: where a patch can be trusted, and where there is none"""
 
@@ -98,7 +96,7 @@ class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
         return f"{target.name}: about {many(self._counted[1], 'touch', 'touches')}"
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout, fields = self.layout, self._draw_target(context)
-        draw_chosen(layout, self, "spacing", fields=fields)
-        layout.separator()
-        draw_all(layout, self, fields)
+        self._draw_target(context)
+        for name in ("spacing", "extent"):  # All else is as the active probe has it.
+            draw_chosen(self.layout, self, name)
+        draw_noise(self.layout, self)

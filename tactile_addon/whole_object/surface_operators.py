@@ -9,7 +9,6 @@ import numpy as np
 from mathutils import Vector
 
 from ..probes.in_slices import InSlices, Progress
-from ..probes.number_fields import dragged, fields
 from ..probes.operators import is_in_object_mode, make_active, polls, report_done, report_error, surface_of
 from ..scene import patch_record
 from ..scene.attributes import DEVIATION
@@ -79,7 +78,6 @@ def _select_nearest(mesh: bpy.types.Mesh, place: Point) -> Any:
     return mesh.vertices[nearest]
 
 
-@dragged
 class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
     """Make the surface again with edges of another length, from the same touches"""
 
@@ -138,9 +136,7 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
-        draw_chosen(
-            layout, self, "edge", fields=fields(surface_of(context)[patch_record.ATLAS_RECORD]["size"])
-        )
+        draw_chosen(layout, self, "edge")
 
 
 CLASSES = (TACTILE_OT_look_farthest, TACTILE_OT_mesh_again)
