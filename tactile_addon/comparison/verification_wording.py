@@ -35,7 +35,7 @@ def verification_summary(record: TouchReport) -> tuple[bool, str]:
         )
     if record["status"] != "ok":
         return True, record["message"]
-    unit = units.unit_of(bpy.context.scene, record["radius"])
+    unit = units.unit_of_report(bpy.context.scene, record)
     mean, most = (_length(record, f"vertex_distance_{key}", unit) for key in ("mean", "max"))
     return False, (
         f'At {many(vertices, "vertex", "vertices")}, "{name}" is {mean} off the patch on average, '

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import bpy
-from bpy.props import IntProperty
+from bpy.props import IntProperty, StringProperty
 
 from ..scene import patch_object, patch_record
 from ..scene.viewports import show_colors, shows_colors
@@ -99,7 +99,7 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
             for plane in touched.report["added_planes"]:
                 _add(settings, plane)
             touch_again.adopt(found, touched, depsgraph, complete=True)
-        unit = units.unit_of(context.scene, touched.result.radius)
+        unit = units.unit_of_report(context.scene, touched.report)
         return report_done(self, added_planes(touched.report, unit))
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -187,7 +187,7 @@ class TACTILE_OT_add_subdivision(_ProbeOperator, bpy.types.Operator):
         if found.tactile_probe.message:
             return report_error(self, ValueError(found.tactile_probe.message))
         record = probe.record_of(found)
-        return report_done(self, verdict(record, units.unit_of(context.scene, record["radius"])))
+        return report_done(self, verdict(record, units.unit_of_report(context.scene, record)))
 
 
 def _subdivide(target: Object) -> None:
@@ -219,6 +219,23 @@ class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
+class TACTILE_OT_activate(bpy.types.Operator):
+    """Make this probe the active object, and show where it is"""
+
+    bl_idname = "tactile.activate"
+    bl_label = "Go to Probe"
+    bl_options = {"UNDO", "INTERNAL"}
+
+    name: StringProperty(name="Name", description="Name of the probe", options={"SKIP_SAVE"})
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        found = context.view_layer.objects.get(self.name)
+        if found is None:
+            return report_error(self, ValueError(f'There is no probe "{self.name}" in this view layer'))
+        make_active(context, found)
+        return {"FINISHED"}
+
+
 class TACTILE_OT_show_colors(bpy.types.Operator):
     """Have this viewport draw the colors of the vertices, in Solid shading"""
 
@@ -246,5 +263,6 @@ OPERATORS = (
     TACTILE_OT_update,
     TACTILE_OT_add_subdivision,
     TACTILE_OT_delete,
+    TACTILE_OT_activate,
     TACTILE_OT_show_colors,
 )

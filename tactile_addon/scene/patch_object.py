@@ -3,7 +3,7 @@
 """The reconstruction as an object of the scene: the patch."""
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import bpy
 import numpy as np
@@ -51,19 +51,22 @@ def insert(scene: bpy.types.Scene, touched: Touched, parent: Object | None = Non
 
 
 def remove_objects(objects: Sequence[Object]) -> None:
-    """Deletes objects, with those of their meshes and materials that nothing else uses."""
+    """Deletes objects, with what nothing else uses: their meshes, materials, and the collection of patches."""
     meshes = [obj.data for obj in objects if obj.data is not None]
     for obj in objects:
         bpy.data.objects.remove(obj)
-    remove_meshes(meshes)
-
-
-def remove_meshes(meshes: Iterable[bpy.types.Mesh]) -> None:
-    """Deletes the meshes that nothing uses, and those of their materials that nothing uses then."""
     meshes = [mesh for mesh in meshes if not mesh.users]
     materials = {material for mesh in meshes for material in mesh.materials if material is not None}
     bpy.data.batch_remove(meshes)
     bpy.data.batch_remove([material for material in materials if not material.users])
+    empty = [c for c in bpy.data.collections if _is_own(c) and not (c.objects or c.children)]
+    bpy.data.batch_remove(empty)
+
+
+def _is_own(collection: bpy.types.Collection) -> bool:
+    """Whether a collection is one of patches that can be used: no library's, nor the override of one."""
+    is_ours = collection.is_editable and collection.override_library is None
+    return is_ours and collection.name.partition(".")[0] == COLLECTION  # There may be a second one.
 
 
 def rewrite(patch: Object, touched: Touched) -> None:
@@ -95,14 +98,7 @@ def _above(patch: Object, touched: Touched) -> float:
 
 def collection(scene: bpy.types.Scene) -> bpy.types.Collection:
     """The collection of a scene's patches, made if there is none."""
-    # In the file's second scene it is "Tactile Patches.001". That of a library, or its override, cannot be
-    # used.
-    named = (
-        c
-        for c in scene.collection.children_recursive
-        if c.name.partition(".")[0] == COLLECTION and c.is_editable and c.override_library is None
-    )
-    found = next(named, None)
+    found = next(filter(_is_own, scene.collection.children_recursive), None)
     if found is None:
         found = bpy.data.collections.new(COLLECTION)
         scene.collection.children.link(found)

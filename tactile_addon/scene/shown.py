@@ -120,7 +120,7 @@ def _record(obj: Object) -> Any:
 def unit_of_range(obj: Object, scene: bpy.types.Scene) -> tuple[int, Unit]:
     """The power of length in the quantity that a patch or whole object shows, and the unit of its legend."""
     report, power = _record(obj), POWERS[obj.tactile_colors]
-    return power, ("", 1.0) if report is None else units.unit_of_colors(scene, report, power)
+    return power, ("", 1.0) if report is None else units.unit_of_report(scene, report)
 
 
 def _get(obj: Object) -> float:

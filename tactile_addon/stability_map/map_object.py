@@ -28,8 +28,10 @@ AREA = "area"  # the area in the world that has the color of each.
 # The map is shown this share of the object's size above the mesh. With less it flickers if it is 20000 clip
 # starts away, as a scan in mm is.
 SHOWN_ABOVE = 5e-3
-# What the colors can show: attribute, name, description, and the power of length in its unit.
+# What the colors can show: attribute, name, description, and the power of length in its unit. The first is
+# shown at first: where a patch can be trusted, and why not.
 MAP_QUANTITIES = [
+    (REASON, "Reason", "Whether there is a patch, and why there is none", 0),
     ("error", "Error", "Mean distance in height between patch and mesh", 1),
     (HEIGHT_STD, "Standard Deviation", "How well the contacts determine the height", 1),
     (
@@ -45,7 +47,6 @@ MAP_QUANTITIES = [
         0,
     ),
     ("blind_share", "Blind Share", "Share of the ways to bend that the planes cannot show", 0),
-    (REASON, "Reason", "Whether there is a patch, and why there is none", 0),
 ]
 LOGARITHMIC = ("condition_number",)  # These have a logarithmic scale from 1.
 # The range reaches at least to where the typical patch, that of the median by area, would be in doubt: this

@@ -211,6 +211,7 @@ class StabilityMap:
             "in_doubt": counts.pop("doubt"),
             "few_facets": self.few_facets,
             "refused": counts,
+            "object_size": self.surface.size,
         }
         for name in MEASURES:
             values = self.measures[name][: self.done]

@@ -217,7 +217,7 @@ def touch_arguments(settings: Any) -> dict[str, Any]:
 def draw_chosen(
     layout: bpy.types.UILayout, settings: Any, name: str, found: Mapping[str, str] | None = None
 ) -> None:
-    """Draws a number that the surface chooses if it is 0; the label says so, with the value it has `found`."""
+    """Draws a number that the surface chooses if it is 0; its label has the value that was `found`."""
     if getattr(settings, name):
         layout.prop(settings, name)
     elif found and found.get(name):

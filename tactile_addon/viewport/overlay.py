@@ -120,12 +120,12 @@ def draw_legend() -> None:
         low = 0.0 if shown in patch_record.POSITIVE else -1.0
         title = patch.bl_rna.properties["tactile_colors"].enum_items[shown].name
         power = patch_record.POWERS[shown]
-        bar = _scale(title, record, units.unit_of_colors(context.scene, record, power), power, low)
+        bar = _scale(title, record, units.unit_of_report(context.scene, record), power, low)
         _draw_box(context, *bar, [("Unknown", colors.UNKNOWN)] if record.get("is_gray") else ())
     elif obj is not None and patch_record.MAP_RECORD in obj and obj.visible_get():
         record, shown = obj[patch_record.MAP_RECORD], obj.tactile_map_colors
         title = obj.bl_rna.properties["tactile_map_colors"].enum_items[shown].name
-        unit = units.unit_of(context.scene, record["spacing"])
+        unit = units.unit_of_report(context.scene, record)
         bar = _scale(title, record, unit, map_object.MAP_POWERS[shown], 0.0)
         if shown == REASON:
             bar = title, 0.0, []

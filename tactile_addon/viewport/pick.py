@@ -170,7 +170,7 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         show_colors(context.space_data)
         show_size(touched.surface.size)
         report = probe.record_of(found)
-        unit = units.unit_of(context.scene, report["radius"])
+        unit = units.unit_of_report(context.scene, report)
         return report_done(self, verdict(report, unit), report["status"] == "ok")
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -219,7 +219,7 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
                 depsgraph = context.evaluated_depsgraph_get()
                 touched = touch(obj, depsgraph, location, toward=eye, **touch_arguments(self))
                 self._seen["touched"] = touched
-                unit = units.unit_of(context.scene, touched.result.radius)
+                unit = units.unit_of_report(context.scene, touched.report)
                 is_sure = touched.report["status"] == "ok"
                 bends = f"principal curvatures {curvatures(touched.report, unit)}"
                 words = short = f"{obj.name}: {bends if is_sure else verdict(touched.report, unit)}"

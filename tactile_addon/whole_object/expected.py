@@ -48,7 +48,7 @@ class Expected:
             touches, seconds = expected(self._mesh, tolerance, noise)
             self._given = given
             about = f"{many(touches, 'touch', 'touches')}, {_time(seconds)}"
-            unit = units.unit_of_report(context.scene, {"tolerance": tolerance})  # as the panel has
+            unit = units.unit_of_report(context.scene, {"size": self._mesh.size})  # as the panel has
             self._words = f"Tolerance {units.length(tolerance, unit)}: about {about}"
         return self._words
 
