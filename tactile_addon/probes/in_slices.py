@@ -13,7 +13,7 @@ from bpy.props import BoolProperty
 from ..touch.settings import TARGET, UNSAVED
 from ..touch.types import OperatorMixin, Outcome
 from ..touch.wording import sentence
-from .operators import report_error, target_object
+from .operators import report_error, target_object, waiting
 
 # These are seconds.
 FIRST_SLICE = 0.2  # Work that takes no longer is done without slices.
@@ -67,7 +67,8 @@ class InSlices(OperatorMixin):
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         try:
-            self._begin(context)
+            with waiting(context):
+                self._begin(context)
             if self._in_window:
                 return self._go_on(context)
             self._check(context)
@@ -155,6 +156,8 @@ class AllOver(InSlices):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         try:
             self.target = target_object(context, self.target).name
+            with waiting(context):
+                self._about(context)
         except ValueError as error:
             return report_error(self, error)
         return self._confirm(context, "Touch")

@@ -51,7 +51,7 @@ def insert(scene: bpy.types.Scene, touched: Touched, parent: Object | None = Non
 
 
 def remove_objects(objects: Sequence[Object]) -> None:
-    """Deletes objects, with what nothing else uses: their meshes, materials, and the collection of patches."""
+    """Deletes objects, with what nothing else uses: their meshes, materials, and an empty collection."""
     meshes = [obj.data for obj in objects if obj.data is not None]
     for obj in objects:
         bpy.data.objects.remove(obj)

@@ -31,7 +31,7 @@ from ..stability_map.map_operator import TACTILE_OT_stability_map
 from ..stability_map.map_report import facets as map_facets
 from ..stability_map.map_report import map_rows, median_rows
 from ..touch import units
-from ..touch.settings import draw_chosen, draw_fit
+from ..touch.settings import draw_chosen, draw_fit, draw_noise
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object, PanelMixin
 from ..touch.units import Unit
@@ -90,6 +90,8 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         row.prop(settings, "live", text="Live" if settings.live else "Live (Frozen)")
         row.operator(TACTILE_OT_update.bl_idname, text="", icon="FILE_REFRESH")
         if body := _folded(layout, "fit", "Sensor and Fit"):
+            draw_chosen(body, settings, "step", chosen)
+            draw_noise(body, settings)
             draw_fit(body, settings, chosen)
 
 

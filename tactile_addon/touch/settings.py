@@ -236,9 +236,7 @@ def draw_noise(layout: bpy.types.UILayout, settings: Any) -> None:
 
 
 def draw_fit(layout: bpy.types.UILayout, settings: Any, found: Mapping[str, str] | None = None) -> None:
-    """Draws the rows of step, noise and method, and of its options; `found` as in draw_chosen."""
-    draw_chosen(layout, settings, "step", found)
-    draw_noise(layout, settings)
+    """Draws the rows of the method and of its options; `found` as in draw_chosen."""
     layout.prop(settings, "method")
     draw_chosen(layout, settings, "degree", found)
     if settings.method in ("tagc", "quadratic-variation"):
@@ -253,4 +251,6 @@ def draw_all(layout: bpy.types.UILayout, settings: Any) -> None:
         column = layout.column(align=True)
         column.prop(settings, "azimuths", index=i, text=f"Azimuth {i + 1}")
         column.prop(settings, "tilts", index=i, text="Tilt")
+    draw_chosen(layout, settings, "step")
+    draw_noise(layout, settings)
     draw_fit(layout, settings)
