@@ -362,8 +362,6 @@ def test_without_a_patch_and_in_edit_mode_the_button_is_gray(empty, patch):
     empty.ops.object.mode_set(mode="OBJECT")
     activate(empty, patch)
     assert empty.ops.tactile.verify.poll()
-    activate(empty, patch.children[0])  # its contours stand for it
-    assert empty.ops.tactile.verify.poll()
 
 
 def test_one_undo_takes_all_of_it_back(empty, patch):
