@@ -55,9 +55,7 @@ def test_patches_of_a_mesh_share_a_range_and_may_be_given_one(empty, ball):
     empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=9.0, location=(20, 0, 0))
     empty.context.object.name = "Distant"
     empty.ops.tactile.reconstruct(target="Distant", location=(20, 0, 9), extent=4.0)
-    assert (
-        empty.context.object["tactile"]["color_limit"] < limits[0]
-    )  # Another object has a range of its own.
+    assert empty.context.object["tactile"]["color_limit"] < limits[0]  # It has a range of its own.
     patches[0].tactile_range = 2e-3  # in 1/mm, as the legend has it
     assert patches[0]["tactile"]["color_limit"] == pytest.approx(2.0, rel=1e-6)
     assert patches[0].tactile_range == pytest.approx(2e-3, rel=1e-6)
