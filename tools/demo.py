@@ -241,7 +241,7 @@ def look(scene, source):
 
 
 def render(patch, path, samples=32):
-    """Draws the scene with Cycles to `path`; the patch, which lies in the mesh, is moved toward the camera."""
+    """Draws the scene with Cycles to `path`, with the patch, which lies in the mesh, nearer to the camera."""
     import bpy
 
     scene = bpy.context.scene
