@@ -79,7 +79,7 @@ def test_by_default_the_mesh_that_was_touched(empty, patch):
     after = patch["tactile"].to_dict()
     assert after.pop("verification") == found
     assert patch.tactile_colors == "deviation"
-    shown = {"color_limit", "own_limit"}  # of the deviation now
+    shown = {"color_limit"}  # of the deviation now
     assert {key: after[key] for key in after.keys() - shown} == {
         key: report[key] for key in report.keys() - shown
     }

@@ -78,12 +78,10 @@ def test_a_flat_patch_is_pale_and_a_bent_one_beside_it_is_not(empty):
 
 
 def test_a_touch_that_knows_nothing_does_not_set_the_range(empty, ball):
-    """Its rim may have any curvature; at its point that is within its deviation of 0."""
     sure = touch(empty, (0, 0, 1))
     limit = sure["tactile"]["color_limit"]
     noisy = touch(empty, (0, 1, 0), extent=0.15, noise=0.02, seed=1)
     assert noisy["tactile"]["status"] == "uncertain"
-    assert np.abs(values(noisy.data, "mean_curvature")).max() > 2.0 * limit
     assert {patch["tactile"]["color_limit"] for patch in (sure, noisy)} == {limit}
 
 

@@ -88,10 +88,10 @@ def test_the_verdict_says_what_limits_a_good_patch(wording, empty):
 
 
 def test_the_deviation_at_the_rim_stands_below_the_mean(said, ball):
-    rows = dict(said.main_rows(ball[1], UNIT))
+    rows = dict(said.other_rows(ball[1], UNIT))
     mean, rim = (float(rows[key].split()[1]) for key in ("Height", "At the Rim"))
     assert 1.5 < rim / mean < 10.0
-    assert dict(said.main_rows({**ball[1], "height_std_rim": 0.04}, UNIT))["At the Rim"] == "± 0.04 mm"
+    assert dict(said.other_rows({**ball[1], "height_std_rim": 0.04}, UNIT))["At the Rim"] == "± 0.04 mm"
 
 
 @pytest.mark.parametrize("status", ["uncertain", "not_converged"])
@@ -290,7 +290,22 @@ def test_a_single_thing_is_not_said_in_the_plural(extension, empty):
     measured |= {"tolerance": None, "radius": 1.0}
     assert "1 patch of 1 contact;" in addon.whole_object.object_report.object_summary(measured)
     made = addon.stability_map.map_report.map_table_rows(
-        {"source": "Cube", "touched": 1, "points": 1, "patches": 1, "in_doubt": 0, "refused": {}}
-        | {"method": "bayes", "degree": "auto", "spacing": 1.0, "extent": 1.0, "step": 0.1}
+        {
+            "source": "Cube",
+            "touched": 1,
+            "points": 1,
+            "patches": 1,
+            "in_doubt": 0,
+            "refused": {},
+            "object_size": 2,
+        }
+        | {
+            "method": "bayes",
+            "degree": "auto",
+            "spacing": 1.0,
+            "extent": 1.0,
+            "step": 0.1,
+            "object_size": 2.0,
+        }
     )
     assert dict(made)["touched"] == "Cube, at 1 of 1 point"

@@ -133,10 +133,10 @@ def test_the_active_color_is_a_symmetric_map_of_gaussian_curvature(empty):
     colors = values(mesh, mesh.color_attributes.active_color_name, "color", 4)
     # On top of a torus K changes its sign: red where positive, blue where negative, pale green between.
     limit = report["color_limit"]
-    assert gaussian.min() < -0.1 * limit < 0.1 * limit < gaussian.max()
+    assert gaussian.min() < -0.05 * limit < 0.05 * limit < gaussian.max()
     red_over_blue = colors[:, 0] - colors[:, 2]
-    assert np.all(red_over_blue[gaussian > 0.1 * limit] > 0.0)
-    assert np.all(red_over_blue[gaussian < -0.1 * limit] < 0.0)
+    assert np.all(red_over_blue[gaussian > 0.04 * limit] > 0.0)
+    assert np.all(red_over_blue[gaussian < -0.04 * limit] < 0.0)
     between = colors[np.abs(gaussian) < 0.01 * limit, :3]
     assert np.all(between > 0.7)
     assert np.all(between[:, 1] > 1.2 * between[:, [0, 2]].max(axis=1))
@@ -198,7 +198,7 @@ def test_several_patches_share_collection_and_materials(empty, ball):
     for _ in range(3):
         reconstruct(empty, target="Sphere", **TOUCH)
     assert [c.name for c in empty.data.collections] == ["Tactile Patches"]
-    assert sorted(m.name for m in empty.data.materials) == ["Tactile Contour", "Tactile Curvature"]
+    assert sorted(m.name for m in empty.data.materials) == ["Tactile Curvature"]
     assert sum("tactile" in obj for obj in empty.data.objects) == 3
 
 
@@ -209,7 +209,7 @@ def test_every_scene_has_one_collection_of_patches(empty, ball):
     with empty.context.temp_override(scene=other, view_layer=other.view_layers[0]):
         for _ in range(2):
             reconstruct(empty, target="Sphere", **TOUCH)
-    assert [len(c.objects) for c in empty.data.collections] == [2, 4]
+    assert [len(c.objects) for c in empty.data.collections] == [1, 2]
 
 
 def test_an_active_patch_stands_for_its_source(empty, ball):
