@@ -28,9 +28,9 @@ from .patch_record import ATLAS_RECORD, COMMON_RANGE, POWERS, RANGE, RECORD, is_
 
 LEAST_BEND = 1e-2  # Curvatures have no smaller range than this, in units of the object's size,
 LEAST_LENGTH = 1e-3  # nor lengths than this, in units of the radius. So a plane is pale green.
-HEADROOM = 1.5  # Curvatures have a range of so many times the usual bend, so that a ball is not at its end.
+HEADROOM = 1.25  # Curvatures have a range of so many times the usual bend, so that a ball is not at its end.
 DEVIATIONS = 3.0  # Lengths of a patch have a range of so many standard deviations of its height.
-TICKS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0)  # Ranges have these first digits, so that they seldom change.
+TICKS = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # Ranges are these, so they seldom change.
 
 
 def recolor(obj: Object) -> None:
