@@ -15,6 +15,7 @@ from ..probes.operators import (
     target_object,
 )
 from ..scene import patch_record
+from ..touch import units
 from ..touch.settings import (
     NAMES,
     TouchSettings,
@@ -26,7 +27,7 @@ from ..touch.settings import (
 from ..touch.types import Outcome
 from . import map_object
 from .map_report import map_summary
-from .stability import StabilityMap, expected_count
+from .stability import StabilityMap, expected_count, seconds_each
 
 
 class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
@@ -43,7 +44,7 @@ class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
     )
 
     stop = "Stop and Keep"
-    _counted: tuple[object, int] = (None, 0)  # The points that were counted last, after what they depend on.
+    _counted: tuple[object, str] = (None, "")  # What was said last, after what it depends on.
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -89,11 +90,14 @@ class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
     def _about(self, context: bpy.types.Context) -> str:
         """A sentence on what will be touched at how many points."""
         target = target_object(context, self.target)
-        given = target.session_uid, self.extent, self.spacing
+        given = target.session_uid, self.extent, self.spacing, self.noise
         if given != self._counted[0]:  # A dialog is drawn often.
             depsgraph = context.evaluated_depsgraph_get()
-            self._counted = given, expected_count(target, depsgraph, self.extent, self.spacing)
-        return f"{target.name}: about {many(self._counted[1], 'touch', 'touches')}"
+            count = expected_count(target, depsgraph, self.extent, self.spacing)
+            seconds = count * seconds_each(target, depsgraph, touch_arguments(self))
+            words = f"about {many(units.rough(count), 'touch', 'touches')}, {units.duration(seconds)}"
+            self._counted = given, f"{target.name}: {words}"
+        return self._counted[1]
 
     def draw(self, context: bpy.types.Context) -> None:
         self._draw_target(context)

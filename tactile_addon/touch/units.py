@@ -83,6 +83,16 @@ def length(value: float, unit: Unit | None = None) -> str:
     return say(value, 1, unit or unit_of(bpy.context.scene, size))
 
 
+def duration(seconds: float) -> str:
+    """About how long something takes, in words."""
+    return f"{rough(max(seconds, 1.0))} s" if seconds < 60.0 else f"{rough(seconds / 60.0)} min"
+
+
+def rough(number: float) -> int:
+    """A number with one significant digit, as an estimate has it."""
+    return int(float(f"{number:.0e}"))
+
+
 def symbol(power: int, unit: Unit) -> str:
     """The unit of length^power, such as "mm" or "1/mm²"; "" for a plain number or if lengths have no unit."""
     name = unit[0] if power else ""

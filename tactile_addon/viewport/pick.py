@@ -215,7 +215,7 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
                 obj, location, eye = found
                 active = context.view_layer.objects.active
                 if (patch_record.touched_record(active) or {}).get("source") == obj.name:
-                    location = touched_near(active, obj, location)
+                    location = touched_near(active, location)
                 depsgraph = context.evaluated_depsgraph_get()
                 touched = touch(obj, depsgraph, location, toward=eye, **touch_arguments(self))
                 self._seen["touched"] = touched
