@@ -210,13 +210,13 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
         layout.operator(TACTILE_OT_stability_map.bl_idname, icon="SHADERFX")
         if obj is None or patch_record.MAP_RECORD not in obj:
             return
+        layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Map", icon="EYEDROPPER").new = True
         record = obj[patch_record.MAP_RECORD]
         unit = units.unit_of_report(context.scene, record)
         if words := map_facets(record):
             draw_sentence(context, layout, words, "ERROR")
         draw_rows(context, layout, map_rows(record, unit))
         _draw_colors(context, layout, obj, "tactile_map_colors")
-        layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Map", icon="EYEDROPPER").new = True
         medians = list(median_rows(record, unit))
         if medians and (body := _folded(layout, "medians", "Medians of the Patches")):
             draw_rows(context, body, medians)

@@ -18,7 +18,7 @@ from common import PICK_BUTTON, check, is_complete, last_report, look, open_tab,
 
 # Places in a window of 1280 by 800 with the sidebar open.
 NUMBER, SENSOR = (790, 420), (840, 321)
-CONTOURS, HANDLES, MAP_PROBE = (813, 493), (972, 493), (893, 440)
+CONTOURS, HANDLES, MAP_PROBE = (813, 493), (972, 493), (893, 284)
 
 
 def probes():
