@@ -84,7 +84,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         t, up = (Vector(axis) for axis in plane_axes(matrix, settings, active).T.tolist()[:2])
         # If the tilt's plane is seen edge on, a little way of the mouse turns it by much.
         if abs(_line_of_sight(context.region_data, center).dot(t)) >= STEEP:
-            shares = np.linspace(-UPRIGHT, UPRIGHT, 2 * UPRIGHT_PLACES)
+            shares = np.linspace(-UPRIGHT, UPRIGHT, 2 * UPRIGHT_PLACES).tolist()
             handles.append((self.tilts[active], [center + share * reach * up for share in shares]))
         for each in (*self.turns, *self.tilts):
             each.hide = True

@@ -309,3 +309,26 @@ def test_a_single_thing_is_not_said_in_the_plural(extension, empty):
         }
     )
     assert dict(made)["touched"] == "Cube, at 1 of 1 point"
+
+
+def test_the_list_of_probes_leads_to_each(extension, empty):
+    empty.ops.mesh.primitive_cylinder_add(vertices=64)
+    for place in ((0.2, 0.1, 1.0), (0.0, -1.0, 0.1)):
+        assert empty.ops.tactile.pick(target="Cylinder", location=place, new=True) == {"FINISHED"}
+    context = SimpleNamespace(
+        scene=empty.context.scene,
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+        region=SimpleNamespace(width=300),
+        view_layer=empty.context.view_layer,
+    )
+    layout = Layout()
+    panel = extension.tactile_addon.sidebar.panel.TACTILE_PT_probes
+    panel.draw_active(None, context, layout, empty.context.object)
+    texts = [text for text, _ in layout.drawn if "κ1" in text]
+    assert [text.split("   ")[0] for text in texts] == ["Cylinder Probe", "Cylinder Probe.001"]
+    assert "κ1 0 ± " in texts[0]
+    assert "κ1 -" in texts[1]
+    assert empty.ops.tactile.activate(name="Cylinder Probe") == {"FINISHED"}
+    assert empty.context.object.name == "Cylinder Probe"
+    with pytest.raises(RuntimeError, match='There is no probe "Nothing" in this view layer'):
+        empty.ops.tactile.activate(name="Nothing")
