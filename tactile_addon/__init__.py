@@ -12,7 +12,7 @@ from .comparison import register_operator, verify_operator
 from .files import contact_operators, export_operators
 from .probes import change_handlers, operators, probe, probe_operators
 from .report import report_operator
-from .scene import color_range
+from .scene import shown
 from .sidebar import dots, panel, preferences, rows
 from .stability_map import map_object, map_operator
 from .viewport import drag, gizmos, overlay, pick, tool
@@ -43,7 +43,7 @@ MENUS = (
     *export_operators.MENUS,
     *report_operator.MENUS,
 )
-PROPERTIES = probe.PROPERTIES | color_range.PROPERTIES | map_object.PROPERTIES  # Of objects, by name.
+PROPERTIES = probe.PROPERTIES | shown.PROPERTIES | map_object.PROPERTIES  # Of objects, by name.
 _commands: list[Any] = []
 _drawings: list[Any] = []
 HERE = str(Path(__file__).resolve().parent)  # It holds presets/.

@@ -41,15 +41,14 @@ def patch_of(probe):
 
 
 def belongings():
-    """Probes, and their patches and contours."""
-    patches = list(filter(None, map(patch_of, probes())))
-    return [*probes(), *patches, *(child for patch in patches for child in patch.children)]
+    """Probes and their patches."""
+    return [*probes(), *filter(None, map(patch_of, probes()))]
 
 
 def _target():
     """The object to touch, which may have been renamed; None if there is none."""
     meshes = (obj for obj in bpy.context.scene.objects if obj.type == "MESH" and obj.name.startswith(TARGET))
-    return next((obj for obj in meshes if "tactile" not in obj and "tactile_contours" not in obj), None)
+    return next((obj for obj in meshes if "tactile" not in obj), None)
 
 
 def _select(obj):
@@ -142,8 +141,8 @@ def _copy(dice):
         if dice.random() < 0.5:
             patch = patch_of(chosen)
         _select(chosen)
-        for obj in filter(None, (patch, *(patch.children if patch else ()))):
-            obj.select_set(True)
+        if patch is not None:
+            patch.select_set(True)
         bpy.ops.object.duplicate("EXEC_DEFAULT", True, linked=dice.random() < 0.3)
 
 
@@ -219,13 +218,7 @@ def faults():
     """What is wrong now, a list of sentences."""
     found = [fault for probe in probes() for fault in _faults_of(probe)]
     found += [f"{obj.name} has no user" for obj in bpy.data.objects if not obj.users]
-    found += [f"{obj.name} has lost its patch" for obj in bpy.data.objects if _is_left(obj)]
-    meshes = (mesh for mesh in bpy.data.meshes if "tactile_digest" in mesh)
-    return found + [f"the mesh {mesh.name} has no user" for mesh in meshes if not mesh.users]
-
-
-def _is_left(obj):
-    return "tactile_contours" in obj and obj.parent is None
+    return found
 
 
 def _faults_of(probe):
@@ -236,9 +229,6 @@ def _faults_of(probe):
         )
     record, radius = patch["tactile"], patch["tactile"]["radius"]
     faults = []
-    for lines in patch.children:
-        if (lines.matrix_world.translation - patch.matrix_world.translation).length > CLOSE * radius:
-            faults.append(f"{lines.name} is not at its patch")
     addon = sys.modules[type(settings).__module__]
     try:
         there = addon.reconstruction_of(patch).frame.origin

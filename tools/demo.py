@@ -17,8 +17,10 @@ SPOT = (0.32, -0.19, 0.84)  # This place is on Suzanne's forehead.
 NOISE = 1.0 / 1200.0  # A share of the object's size, as 0.05 mm is of 60 mm.
 WIDTH, HEIGHT = 1200, 900
 BAR_STEPS = 128
-BAR_REACH = 1.5  # Half the length of the color bar, in radii of the patch.
-ASIDE = 1.3  # The patch is this many radii to the left of the middle, so that the bar is next to the object.
+BAR_REACH = 1.2  # Half the length of the color bar, in units of the picture.
+# The picture is this many units wide; the mesh has so many of them, in a middle that is so far to the left.
+PICTURE, MESH, ASIDE = 7.0, 4.6, 0.9
+THICKNESS = 0.025  # That of a curve in units of the picture.
 BACKGROUND = (0.8, 0.82, 0.85, 1.0)
 
 
@@ -76,66 +78,100 @@ def touch(extension, mesh=""):
 
 
 def compose(extension, patch, unit):
-    """Adds camera, light, a color bar and labels for a picture of the patch in its true colors."""
+    """Adds camera, light, curves, a color bar and labels for a picture of the patch in its true colors."""
     report = patch[extension.tactile_addon.scene.patch_record.RECORD].to_dict()
-    put, radius = stage(extension, report), report["radius"]
+    put = stage(extension, report)
+    put.curves(extension, extension.reconstruction_of(patch).contours)
     color_bar(extension, put, report["color_limit"], unit)
-    put.text(f"{report['source']}, touched at {report['contacts']} points", -3.3, 2.25, 0.21)
-    put.text(f"principal curvatures {report['k1']:.3g} and {report['k2']:.3g} 1/{unit}", -3.3, -2.25, 0.14)
-    if report["vertices"]:
-        off, std = (100.0 * report[key] / radius for key in ("vertex_distance_mean", "height_std"))
-        sentence = (
-            f"{report['vertices']} mesh vertices off by {off:.1f} % of the radius on average, "
-            f"standard deviation {std:.1f} %"
-        )
-        put.text(sentence, -3.3, -2.48, 0.14)
+    put.text(f"{report['source']}: a patch felt along {len(report['planes'])} curves", -3.3, 2.25, 0.21)
+    put.text(f"It is {2.0 * report['radius']:.2g} {unit} across, {bends(report, unit)}.", -3.3, -2.25, 0.14)
+    if "height_error" in report:
+        off = 100.0 * report["height_error"] / report["radius"]
+        words = f"Between the curves, too, it is off the model by only {off:.1g} % of its radius on average."
+        put.text(words, -3.3, -2.48, 0.14)
+
+
+def bends(report, unit):
+    """How much the patch bends at its middle, in words without curvature."""
+    radii = [f"{1.0 / abs(report[name]):.2g} {unit}" for name in ("k1", "k2") if abs(report[name]) > 1e-9]
+    if not radii:
+        return "and flat"
+    return f"and bends like circles with radii of {' and '.join(radii)}"
 
 
 def stage(extension, report):
-    """Sets up camera, light and materials around the patch of a report; returns an _Overlay for labels."""
+    """Sets up camera, light and materials around the mesh of a report; returns an _Overlay for labels."""
     import bpy
     from mathutils import Matrix, Vector
 
-    radius, scene = report["radius"], bpy.context.scene
-    point, normal = Vector(report["frame"]["origin"]), Vector(report["frame"]["normal"])
+    scene, source = bpy.context.scene, bpy.data.objects[report["source"]]
+    normal = Vector(report["frame"]["normal"])
     upright = Vector((0, 0, 1)) if abs(normal.z) < 0.9 else Vector((0, 1, 0))
     right = upright.cross(normal).normalized()
     view = (normal - 0.2 * right - 0.6 * normal.cross(right)).normalized()
     right = normal.cross(right).cross(view).normalized()
+    axes = Matrix((right, view.cross(right), view)).transposed()
+    corners = np.array([axes.transposed() @ (source.matrix_world @ Vector(c)) for c in source.bound_box])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    unit = float((high - low)[:2].max()) / MESH
 
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.type, camera.data.ortho_scale = "ORTHO", 7.0 * radius
-    away = 100.0 * radius
+    camera.data.type, camera.data.ortho_scale = "ORTHO", PICTURE * unit
+    away = 100.0 * unit
     camera.data.clip_end = 10.0 * away
-    axes = Matrix((right, view.cross(right), view)).transposed()
-    camera.matrix_world = Matrix.LocRotScale(point + ASIDE * radius * right + away * view, axes, None)
+    middle = axes @ Vector(0.5 * (low + high)) + ASIDE * unit * right
+    camera.matrix_world = Matrix.LocRotScale(middle + away * view, axes, None)
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
     sun.data.energy, sun.data.angle = 2.0, 0.3
     sun.matrix_world = camera.matrix_world @ Matrix.Rotation(-0.6, 4, "X") @ Matrix.Rotation(-0.6, 4, "Y")
     for obj in (camera, sun):
         scene.collection.objects.link(obj)
     scene.camera = camera
-    look(scene, bpy.data.objects[report["source"]])
+    look(scene, source)
     ink = extension.tactile_addon.scene.mesh_data.emission("Ink", color=(0.01, 0.01, 0.01, 1.0))
     paper = extension.tactile_addon.scene.mesh_data.emission("Paper", color=BACKGROUND)
-    put = _Overlay(camera, radius, ink)
+    put = _Overlay(camera, unit, ink)
     put.card(paper, -2.1)
     return put
 
 
 class _Overlay:
-    """Places things in front of the camera, in units of the patch radius from the picture's center."""
+    """Places things in front of the camera, in units of the picture from its center."""
 
-    def __init__(self, camera, radius, ink):
-        self.camera, self.radius, self.ink = camera, radius, ink
+    def __init__(self, camera, unit, ink):
+        self.camera, self.unit, self.ink = camera, unit, ink
+        # What lies in the mesh is moved toward the camera, which is orthographic, so that this does not show.
+        self.toward = camera.matrix_world.col[2].xyz * camera.data.ortho_scale * 0.05
+
+    def curves(self, extension, contours):
+        """Adds the contours as tubes in the colors of their planes, in front of the mesh; returns them."""
+        module = extension.tactile_addon
+        colors = module.scene.colors.linear([(*color, 1.0) for color in module.viewport.curves.PLANE_COLORS])
+        return [self._curve(extension, c.points, color) for c, color in zip(contours, colors, strict=False)]
+
+    def _curve(self, extension, points, color):
+        import bpy
+
+        data = bpy.data.curves.new("Curve", "CURVE")
+        data.dimensions, data.bevel_depth = "3D", 0.5 * THICKNESS * self.unit
+        spline = data.splines.new("POLY")
+        spline.points.add(len(points) - 1)
+        rows = np.column_stack([points + 1.5 * np.array(self.toward), np.ones(len(points))])
+        spline.points.foreach_set("co", rows.ravel())
+        name = "Curve {:.2f} {:.2f} {:.2f}".format(*color[:3])
+        data.materials.append(extension.tactile_addon.scene.mesh_data.emission(name, color=color))
+        obj = bpy.data.objects.new("Curve", data)
+        obj.visible_shadow = False
+        bpy.context.scene.collection.objects.link(obj)
+        return obj
 
     def add(self, name, data, x, y, behind=1.0):
         import bpy
 
         obj = bpy.data.objects.new(name, data)
         obj.parent = self.camera
-        obj.location = (x * self.radius, y * self.radius, -behind * self.radius)
-        obj.scale = (self.radius,) * 3
+        obj.location = (x * self.unit, y * self.unit, -behind * self.unit)
+        obj.scale = (self.unit,) * 3
         bpy.context.scene.collection.objects.link(obj)
         return obj
 
@@ -173,11 +209,14 @@ def color_bar(extension, put, limit, unit):
     module.scene.mesh_data.fill(strip, points, triangles, attributes)
     strip.materials.append(bpy.data.materials["Tactile Curvature"])
     bar = [put.add("Color Bar", strip, 2.35, 0.0)]
-    bar.append(put.text("Gaussian curvature", 1.6, BAR_REACH + 0.45, 0.18))
-    bar.append(put.text(f"in 1/{unit}²", 2.25, BAR_REACH + 0.2, 0.18))
+    bar.append(put.text("Mean curvature", 1.6, BAR_REACH + 0.45, 0.18))
+    bar.append(put.text(f"in 1/{unit}", 1.6, BAR_REACH + 0.2, 0.18))
+    meanings = {-1.0: "bulges", 0.0: "flat", 1.0: "hollow"}
     for share in (-1.0, -0.5, 0.0, 0.5, 1.0):
         words = f"{share * limit:+.3g}" if share else "0"
         bar.append(put.text(words, 2.62, BAR_REACH * share - 0.05, 0.15))
+        if share in meanings:
+            bar.append(put.text(meanings[share], 1.72, BAR_REACH * share - 0.05, 0.15))
     return bar
 
 
@@ -202,19 +241,13 @@ def look(scene, source):
 
 
 def render(patch, path, samples=32):
-    """Draws the scene with Cycles to `path`.
-
-    Patch and contours lie in the mesh, so they are moved toward the camera for the picture. The camera is
-    orthographic, so this does not show.
-    """
+    """Draws the scene with Cycles to `path`, with the patch, which lies in the mesh, nearer to the camera."""
     import bpy
 
     scene = bpy.context.scene
-    toward = scene.camera.matrix_world.col[2].xyz * scene.camera.data.ortho_scale * 0.05
-    (lines,) = patch.children
-    patch.delta_location, lines.delta_location = toward, patch.matrix_world.to_3x3().inverted() @ toward
+    patch.delta_location = scene.camera.matrix_world.col[2].xyz * scene.camera.data.ortho_scale * 0.05
     photograph(scene, path, WIDTH, HEIGHT, samples)
-    patch.delta_location = lines.delta_location = (0.0, 0.0, 0.0)
+    patch.delta_location = (0.0, 0.0, 0.0)
 
 
 def photograph(scene, path, width, height, samples=32):

@@ -20,10 +20,10 @@ STROKES, TURNS = 7, 15  # The numbers of pictures of each curve, and of the turn
 SHORT, LONG = 90, 1500  # The milliseconds that a picture is shown.
 CAPTIONS = (
     "A finger slides along three curves",
-    "From these curves: the patch, by Gaussian curvature",
+    "From these curves alone: the surface between them",
     "Turn the planes, and the patch follows",
 )
-CURVE, FINGER = (0.02, 0.02, 0.02, 1.0), (0.9, 0.35, 0.02, 1.0)
+FINGER = (0.9, 0.35, 0.02, 1.0)
 
 
 def main():
@@ -67,18 +67,17 @@ class Film:
         self.extension, self.folder, self.count = extension, folder, 0
         self.patch = demo.touch(extension)
         self.report = self.patch["tactile"].to_dict()
-        put = demo.stage(extension, self.report)
+        self.put = put = demo.stage(extension, self.report)
         self.limit = self.report["color_limit"]
         self.legend = demo.color_bar(extension, put, self.limit, "m")
         self.caption = put.text("", -3.3, -2.45, 0.24)
-        scene = bpy.context.scene
-        self.toward = scene.camera.matrix_world.col[2].xyz * scene.camera.data.ortho_scale * 0.05
-        scene.render.use_persistent_data = True
-        self.hide_results()
+        self.toward = put.toward
+        bpy.context.scene.render.use_persistent_data = True
+        self.patch.hide_render = True
 
     def shots(self):
         """Yields (path, milliseconds) of each picture."""
-        curves = [self.curve(contour) for contour in self.contours()]
+        curves = self.put.curves(self.extension, self.contours())
         finger = self.finger()
         for obj in self.legend:
             obj.hide_render = True
@@ -93,7 +92,7 @@ class Film:
             self.touch_again(np.radians(60.0) * (turn + 1) / TURNS)
             for curve in curves:
                 self.remove(curve)
-            curves = [self.curve(contour) for contour in self.contours()]
+            curves = self.put.curves(self.extension, self.contours())
             self.show(self.patch)
         yield self.shot(LONG)
 
@@ -102,7 +101,7 @@ class Film:
         self.caption.data.body = CAPTIONS[0]
         for curve in curves:
             curve.hide_render = True
-        for curve, contour in zip(curves, self.contours(), strict=True):
+        for curve, contour in zip(curves, (c.points for c in self.contours()), strict=True):
             curve.hide_render = False
             for share in np.linspace(0.0, 1.0, STROKES):
                 curve.data.bevel_factor_end = max(share, 1e-3)
@@ -114,20 +113,8 @@ class Film:
         self.remove(finger)
 
     def contours(self):
-        """Points (n, 3) of each contour."""
-        return [c.points for c in self.extension.reconstruction_of(self.patch).contours]
-
-    def curve(self, points):
-        """Adds a tube along points (n, 3), in front of the mesh, and returns it."""
-        import bpy
-
-        data = bpy.data.curves.new("Curve", "CURVE")
-        data.dimensions, data.bevel_depth = "3D", 0.02 * self.report["radius"]
-        spline = data.splines.new("POLY")
-        spline.points.add(len(points) - 1)
-        rows = np.column_stack([points + 1.5 * np.array(self.toward), np.ones(len(points))])
-        spline.points.foreach_set("co", rows.ravel())
-        return self.link("Curve", data, CURVE)
+        """The contours of the patch."""
+        return self.extension.reconstruction_of(self.patch).contours
 
     def finger(self):
         """Adds a ball to the scene and returns it."""
@@ -140,22 +127,13 @@ class Film:
         ball.visible_shadow = False  # It floats, like all that is drawn in front of the mesh.
         return ball
 
-    def link(self, name, data, color):
-        import bpy
-
-        data.materials.append(self.extension.tactile_addon.scene.mesh_data.emission(name, color=color))
-        obj = bpy.data.objects.new(name, data)
-        obj.visible_shadow = False
-        bpy.context.scene.collection.objects.link(obj)
-        return obj
-
     def touch_again(self, angle):
         """Replaces the patch by one with all planes turned by an angle in radians."""
         import bpy
 
         report = self.report
         azimuths = [np.radians(azimuth) + angle for azimuth, _ in report["planes"]]
-        old = (self.patch, *self.patch.children)
+        old = self.patch
         bpy.ops.tactile.reconstruct(
             target=report["source"],
             location=demo.SPOT,
@@ -165,14 +143,9 @@ class Film:
             azimuths=[*azimuths, 0.0, 0.0, 0.0],
         )
         self.patch = bpy.context.view_layer.objects.active
-        for obj in old:
-            self.remove(obj)
-        self.extension.tactile_addon.scene.color_range.set_range(self.patch, self.limit)
-        self.hide_results()
-
-    def hide_results(self):
-        for obj in (self.patch, *self.patch.children):
-            obj.hide_render = True
+        self.remove(old)
+        self.extension.tactile_addon.scene.shown.set_range(self.patch, self.limit)
+        self.patch.hide_render = True
 
     def show(self, patch):
         patch.hide_render, patch.visible_shadow, patch.delta_location = False, False, self.toward

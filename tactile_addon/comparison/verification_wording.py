@@ -35,7 +35,7 @@ def verification_summary(record: TouchReport) -> tuple[bool, str]:
         )
     if record["status"] != "ok":
         return True, record["message"]
-    unit = units.unit_of(bpy.context.scene, record["radius"])
+    unit = units.unit_of_report(bpy.context.scene, record)
     mean = _length(record, "vertex_distance_mean", unit)
     most = _length(
         record, max("vertex_distance_max", "patch_distance_max", key=lambda key: found.get(key, 0.0)), unit

@@ -87,7 +87,6 @@ class Verification:
         mesh_data.own_mesh(patch)
         mesh_data.write(patch.data, attributes.DEVIATION, deviations)
         shown.recolor(patch)
-        shown.share_ranges()
         farthest = float(np.abs(deviations).max())
         record["verification"] = {"target": self.target, **self._found, "patch_distance_max": farthest}
         if record["source"] == self.target:  # A touch compares with fewer of its vertices.

@@ -22,7 +22,7 @@ from ...core.arguments import many
 from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import is_in_object_mode, make_active, report_done, report_error
 from ..scene import patch_object
-from ..touch.settings import FitSettings, draw_chosen, draw_solver, given, length_property
+from ..touch.settings import FitSettings, draw_chosen, draw_fit, given, length_property
 from ..touch.types import Outcome
 from ..touch.units import length
 from ..touch.wording import fit_summary
@@ -181,7 +181,7 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
         if self.whole:
             draw_chosen(layout, self, "tolerance")
         else:
-            draw_solver(layout, self)
+            draw_fit(layout, self)
 
 
 class TACTILE_FH_contacts(bpy.types.FileHandler):

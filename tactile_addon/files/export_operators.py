@@ -21,13 +21,13 @@ from . import contact_file, patch_table
 
 
 class ObjectExport(ExportHelper, OperatorMixin):  # type: ignore[misc]  # of `invoke`, by the stubs
-    """For operators that write what is active to inherit: a patch, by itself, its probe or its contours."""
+    """For operators that write what is active to inherit: a patch, by itself or its probe."""
 
     if TYPE_CHECKING:  # At run time this would hide the property of ExportHelper.
         filepath: str
     filename_ext: str
     write: Callable[[Object], None]
-    hint = "Select a patch, its probe or its contours first"
+    hint = "Select a patch or its probe first"
 
     @staticmethod
     def written(context: bpy.types.Context) -> Object | None:

@@ -32,7 +32,7 @@ WORD_COLUMNS = ("source", "method", "status", "message")
 
 
 def patches_of(objects: Iterable[Object]) -> list[Object]:
-    """The patches among objects, or that belong to probes and contours among them, by name."""
+    """The patches among objects, or that belong to probes among them, by name."""
     patches = {probe.patch_near(obj) for obj in objects} - {None}
     return sorted((patch for patch in patches if probe.record_of(patch) is not None), key=lambda p: p.name)
 

@@ -2,23 +2,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What was deleted beneath a probe, and what undo brings back."""
 
-from collections.abc import Iterable
-from typing import Any
-
 import bpy
 
-from ..scene import patch_object, patch_record, shown, undo
 from ..scene.viewports import has_gesture
 from ..touch.settings import silent
 from ..touch.types import Object
 from . import anchor
-from .probe import DIGEST, is_result
 
 # Datablocks that drop a deleted object by themselves.
 WINDOW_DATA = bpy.types.Scene | bpy.types.Screen | bpy.types.WindowManager | bpy.types.WorkSpace
 LATER = 0.25  # The seconds after which it is checked again whether a gesture has ended.
 _deleted: set[int] = set()  # The session_uids of deleted targets.
-contour_owners: dict[int, int] = {}  # By those of contours, those of their last patches.
 
 
 def forget_target(probe: Object) -> None:
@@ -88,32 +82,8 @@ def relink(probe: Object) -> None:
             anchor.attach(probe, target)
 
 
-def look_for_contours() -> None:
-    """Deletes contours whose patch was deleted, because without its coordinates they mean nothing."""
-    there: dict[int, Object] = {obj.session_uid: obj for obj in bpy.data.objects}
-    for number, obj in there.items():
-        if patch_record.CONTOURS in obj and obj.parent is not None:
-            contour_owners[number] = obj.parent.session_uid
-    if any(_is_left(obj, there) for obj in there.values()) or _unused_meshes():
-        remove_soon()
-
-
-def _is_left(obj: Object, there: dict[int, Object]) -> bool:
-    """Whether an object is contours whose patch was deleted."""
-    owner = contour_owners.get(obj.session_uid)
-    return owner is not None and owner not in there and obj.parent is None and obj.is_editable
-
-
-def _unused_meshes() -> list[bpy.types.Mesh]:
-    meshes: Iterable[Any] = bpy.data.meshes
-    return [mesh for mesh in meshes if DIGEST in mesh and not mesh.users]
-
-
 def remove() -> float | None:
-    """Removes the datablocks of what was deleted if nobody uses them; Blender calls it as a timer.
-
-    The patches that are left may have a smaller range then.
-    """
+    """Removes the targets that were deleted if nobody uses them; Blender calls it as a timer."""
     if has_gesture():
         return LATER
     there = {obj.session_uid: obj for obj in bpy.data.objects}
@@ -122,12 +92,7 @@ def remove() -> float | None:
     # would then bring back the object, but not these links.
     pointing = bpy.data.user_map(subset=gone) if gone else {}
     gone = [obj for obj in gone if all(isinstance(user, WINDOW_DATA) for user in pointing.get(obj, ()))]
-    left = [obj for obj in there.values() if _is_left(obj, there) and is_result(obj)]
     _deleted.clear()
-    patch_object.remove_objects(left)
     for obj in gone:
         bpy.data.objects.remove(obj)
-    patch_object.remove_meshes(_unused_meshes())
-    with undo.after_step():
-        shown.share_ranges()
     return None

@@ -13,7 +13,7 @@ from bpy.props import BoolProperty
 from ..touch.settings import TARGET, UNSAVED
 from ..touch.types import OperatorMixin, Outcome
 from ..touch.wording import sentence
-from .operators import fields_of, report_error, target_object
+from .operators import report_error, target_object, waiting
 
 # These are seconds.
 FIRST_SLICE = 0.2  # Work that takes no longer is done without slices.
@@ -67,7 +67,8 @@ class InSlices(OperatorMixin):
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         try:
-            self._begin(context)
+            with waiting(context):
+                self._begin(context)
             if self._in_window:
                 return self._go_on(context)
             self._check(context)
@@ -155,12 +156,14 @@ class AllOver(InSlices):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         try:
             self.target = target_object(context, self.target).name
+            with waiting(context):
+                self._about(context)
         except ValueError as error:
             return report_error(self, error)
         return self._confirm(context, "Touch")
 
-    def _draw_target(self, context: bpy.types.Context) -> dict[str, str]:
-        """Draws the mesh and what it will take; returns the properties of lengths, see number_fields."""
+    def _draw_target(self, context: bpy.types.Context) -> None:
+        """Draws the mesh and what it will take."""
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop_search(self, "target", context.scene, "objects")
@@ -169,7 +172,6 @@ class AllOver(InSlices):
         except ValueError as error:
             words = sentence(error)
         layout.label(text=words, translate=False)
-        return fields_of(context, self.target)
 
 
 def _status(stop: str, words: str, share: float | None) -> Callable[[Any, bpy.types.Context], None]:

@@ -13,7 +13,6 @@ from ..touch.settings import UNSAVED, PlacedTouch, draw_all, given, length_prope
 from ..touch.touch_object import completed, touch
 from ..touch.types import Object, Outcome
 from ..touch.wording import fit_summary, sentence
-from .number_fields import fields
 from .probe import is_result, lock_of, patch_near, probe_of, record_of
 
 NO_MESH = "There is no mesh to touch: add one (Shift A), or import a scan (File > Import)"
@@ -104,14 +103,6 @@ def surface_of(context: bpy.types.Context) -> Object | None:
     return obj if obj is not None and patch_record.ATLAS_RECORD in obj else None
 
 
-def fields_of(context: bpy.types.Context, name: str) -> dict[str, str]:
-    """The properties by which an operator shows lengths for the object it touches, see number_fields."""
-    try:
-        return fields(max(target_object(context, name).dimensions))
-    except ValueError:
-        return fields(1.0)
-
-
 @contextmanager
 def waiting(context: bpy.types.Context) -> Iterator[None]:
     """Shows in a window that it takes a while, as the first touch of a large mesh, which builds a tree."""
@@ -155,7 +146,7 @@ def has_target(operator: type[Any], context: bpy.types.Context) -> bool:
 
 
 def has_patch(operator: type[Any], context: bpy.types.Context, hint: str) -> bool:
-    """Whether the active object is a patch, its probe or its contours; if not, the poll gives a hint."""
+    """Whether the active object is a patch or its probe; if not, the poll gives a hint."""
     return polls(operator, patch_near(context.view_layer.objects.active), hint)
 
 

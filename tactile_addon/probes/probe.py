@@ -27,9 +27,6 @@ may differ afterward.
                      and touches then if there was no time before
 """
 
-from collections.abc import Mapping
-from typing import Any
-
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -43,10 +40,10 @@ from bpy.props import (
 from ... import core
 from ..scene import patch_object, patch_record, shown
 from ..scene.family import all_objects, children_of
-from ..touch.settings import OVERRIDABLE, FitSettings, TouchSettings, changed, is_silent
+from ..touch.settings import OVERRIDABLE, TouchSettings, changed, is_silent
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object
-from . import anchor, number_fields
+from . import anchor
 
 DIGEST = "tactile_digest"
 
@@ -143,8 +140,8 @@ def is_probe(obj: Object) -> bool:
 
 
 def is_result(obj: Object) -> bool:
-    """Whether an object is a patch, contours, a stability map or a whole object."""
-    keys = patch_record.RECORD, patch_record.CONTOURS, patch_record.MAP_RECORD, patch_record.ATLAS_RECORD
+    """Whether an object is a patch, a stability map or a whole object."""
+    keys = patch_record.RECORD, patch_record.MAP_RECORD, patch_record.ATLAS_RECORD
     return any(key in obj for key in keys)
 
 
@@ -159,11 +156,9 @@ def _is_patch(obj: Object) -> bool:
 
 
 def patch_near(obj: Object) -> Object | None:
-    """The patch that `obj` is, or keeps as a probe, or is the contours of; or None."""
+    """The patch that `obj` is, or keeps as a probe; or None."""
     if is_probe(obj):
         return patch_of(obj)
-    if obj is not None and patch_record.CONTOURS in obj:
-        obj = obj.parent
     return obj if obj is not None and _is_patch(obj) else None
 
 
@@ -171,12 +166,12 @@ def reconstruction_of(obj: Object) -> core.Reconstruction:
     """The core.Reconstruction of the patch near `obj`, where it is now. Raises ValueError without one."""
     patch = patch_near(obj)
     if patch is None:
-        raise ValueError("Wanted a patch, its probe or its contours, got another object or none")
+        raise ValueError("Wanted a patch or its probe, got another object or none")
     return patch_record.reconstruction_of(patch)
 
 
 def probe_of(obj: Object) -> Object | None:
-    """The probe that `obj` is, or is the patch or the contours of; or None."""
+    """The probe that `obj` is, or is the patch of; or None."""
     if is_probe(obj):
         return obj
     patch = patch_near(obj)
@@ -191,7 +186,7 @@ def record_of(obj: Object) -> TouchReport | None:
 
 def require_unlocked(obj: Object) -> None:
     """Raises ValueError if anything of the probe or patch near `obj` cannot be changed."""
-    for each in filter(None, (probe_of(obj), *patch_record.parts_of(patch_near(obj)))):
+    for each in filter(None, (probe_of(obj), patch_near(obj))):
         if not each.is_editable:
             raise ValueError(
                 f'"{each.name}" comes from a library: make it local, or override it, to change it'
@@ -220,25 +215,7 @@ def make(context: bpy.types.Context, target: Object) -> Object:
 
 def _show(obj: Object) -> None:
     """Colors a patch by the quantity it is set to show now, without the range of the one before."""
-    obj.pop(patch_record.RANGE, None)
-    obj.pop(patch_record.COMMON_RANGE, None)
-    if obj.is_editable and patch_record.is_colored(obj):  # If not, verifying and exporting say so.
-        shown.recolor(obj)
-        if patch_record.RECORD in obj:
-            shown.share_ranges()
-
-
-def _show_contours(patch: Object, shown: bool) -> None:
-    """Shows or hides the contours of a patch, if it has any."""
-    lines = patch_record.contours_of(patch)
-    if lines is not None:
-        lines.hide_viewport = not shown
-
-
-def _found(probe: Object, name: str) -> float:
-    """The value that the last touch chose for a number that is 0."""
-    record: Mapping[str, Any] | None = record_of(probe)
-    return 0.0 if record is None or name == "noise" else record.get(name, 0.0)
+    shown.set_range(obj, 0.0)
 
 
 # Properties of objects, by name.
@@ -253,9 +230,14 @@ PROPERTIES = {
     ),
     "tactile_contours": BoolProperty(
         name="Contours",
-        description="Show the curves that the finger followed",
-        get=lambda obj: (lines := patch_record.contours_of(obj)) is not None and not lines.hide_viewport,
-        set=lambda obj, shown: _show_contours(obj, shown),
+        description="Show the curves that the finger followed, in the colors of their planes",
+        default=True,
+        override=OVERRIDABLE,
+    ),
+    "tactile_directions": BoolProperty(
+        name="Directions",
+        description="Show the principal directions, along which the surface bends by κ1 and κ2",
+        override=OVERRIDABLE,
     ),
     "tactile_target": StringProperty(  # A pointer would keep a deleted mesh.
         name="Target",
@@ -267,10 +249,6 @@ PROPERTIES = {
 
 def register() -> None:
     """Registers the settings of probes, which PROPERTIES need."""
-    TactileProbe.__annotations__.update(number_fields.annotations(TactileProbe, _found))
-    TactileProbe.__annotations__["degree_shown"] = number_fields.degree_field(
-        FitSettings.__annotations__["degree"].keywords, _found
-    )
     bpy.utils.register_class(TactileProbe)
 
 

@@ -7,18 +7,16 @@ from collections.abc import Mapping
 from typing import Any
 
 import bpy
-from bpy.props import IntProperty
+from bpy.props import IntProperty, StringProperty
 
-from ...core.arguments import many
-from ..scene import color_range, patch_object, patch_record, shown
+from ..scene import patch_object, patch_record
 from ..scene.viewports import show_colors, shows_colors
 from ..touch import units
-from ..touch.settings import MOST_PLANES, length_property
+from ..touch.settings import MOST_PLANES, length_property, silent
 from ..touch.types import Object, OperatorMixin, Outcome
 from ..touch.wording import added_planes, verdict
 from . import probe, touch_again
 from .operators import (
-    has_patch,
     is_in_object_mode,
     is_unlocked,
     make_active,
@@ -34,7 +32,7 @@ MOST_FACES = 500_000  # as long as it has no more faces then.
 
 
 class _ProbeOperator(OperatorMixin):
-    """For operators on the active probe, or on that of the active patch or contours, to inherit."""
+    """For operators on the active probe, or on that of the active patch, to inherit."""
 
     bl_options = {"REGISTER", "UNDO"}
 
@@ -70,13 +68,12 @@ class TACTILE_OT_add_plane(_PlaneOperator, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
         record, settings = probe.record_of(found) or {}, found.tactile_probe
-        settings.is_probe = False  # The changes below must not make it touch again each time.
-        # A touch that chose its lengths anew would not be the one whose deviation was promised.
-        for name in ("extent", "step"):
-            setattr(settings, name, getattr(settings, name) or record.get(name, 0.0))
-        _add(settings, record.get("suggested_plane"))
-        settings.is_probe = True
-        touch_again.refresh(found, context)
+        with silent():
+            # A touch that chose its lengths anew would not be the one whose deviation was promised.
+            for name in ("extent", "step"):
+                setattr(settings, name, getattr(settings, name) or record.get(name, 0.0))
+            _add(settings, record.get("suggested_plane"))
+            touch_again.refresh(found, context)
         return {"FINISHED"}
 
 
@@ -98,12 +95,11 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
         except ValueError as error:
             return report_error(self, error)
         settings = found.tactile_probe
-        settings.is_probe = False  # The changes below must not make it touch again each time.
-        for plane in touched.report["added_planes"]:
-            _add(settings, plane)
-        touch_again.adopt(found, touched, depsgraph, complete=True)
-        settings.is_probe = True
-        unit = units.unit_of(context.scene, touched.result.radius)
+        with silent():
+            for plane in touched.report["added_planes"]:
+                _add(settings, plane)
+            touch_again.adopt(found, touched, depsgraph, complete=True)
+        unit = units.unit_of_report(context.scene, touched.report)
         return report_done(self, added_planes(touched.report, unit))
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -138,12 +134,13 @@ class TACTILE_OT_remove_plane(_PlaneOperator, bpy.types.Operator):
             return report_error(
                 self, ValueError(f"There are {count} planes, 0 to {count - 1}: choose one of them")
             )
-        for name in ("azimuths", "tilts"):
-            values = list(getattr(settings, name))
-            values.append(values.pop(self.plane))
-            setattr(settings, name, values)
-        settings.plane_count -= 1
-        touch_again.refresh(found, context)
+        with silent():
+            for name in ("azimuths", "tilts"):
+                values = list(getattr(settings, name))
+                values.append(values.pop(self.plane))
+                setattr(settings, name, values)
+            settings.plane_count -= 1
+            touch_again.refresh(found, context)
         return {"FINISHED"}
 
 
@@ -190,7 +187,7 @@ class TACTILE_OT_add_subdivision(_ProbeOperator, bpy.types.Operator):
         if found.tactile_probe.message:
             return report_error(self, ValueError(found.tactile_probe.message))
         record = probe.record_of(found)
-        return report_done(self, verdict(record, units.unit_of(context.scene, record["radius"])))
+        return report_done(self, verdict(record, units.unit_of_report(context.scene, record)))
 
 
 def _subdivide(target: Object) -> None:
@@ -207,7 +204,7 @@ def _subdivide(target: Object) -> None:
 
 
 class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
-    """Delete the probe with its patch and contours; the mesh that was touched stays"""
+    """Delete the probe with its patch; the mesh that was touched stays"""
 
     bl_idname = "tactile.delete"
     bl_label = "Delete Probe and Patch"
@@ -216,10 +213,26 @@ class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
         found = probe.probe_of(context.view_layer.objects.active)
         target = found.tactile_probe.target
         patch = probe.patch_of(found)
-        patch_object.remove_objects([*patch_record.parts_of(patch), found])
-        shown.share_ranges()
+        patch_object.remove_objects([obj for obj in (patch, found) if obj is not None])
         if target is not None:  # What comes next, as another pick, is about it.
             make_active(context, target)
+        return {"FINISHED"}
+
+
+class TACTILE_OT_activate(bpy.types.Operator):
+    """Make this probe the active object, and show where it is"""
+
+    bl_idname = "tactile.activate"
+    bl_label = "Go to Probe"
+    bl_options = {"UNDO", "INTERNAL"}
+
+    name: StringProperty(name="Name", description="Name of the probe", options={"SKIP_SAVE"})
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        found = context.view_layer.objects.get(self.name)
+        if found is None:
+            return report_error(self, ValueError(f'There is no probe "{self.name}" in this view layer'))
+        make_active(context, found)
         return {"FINISHED"}
 
 
@@ -243,23 +256,6 @@ class TACTILE_OT_show_colors(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class TACTILE_OT_share_range(bpy.types.Operator):
-    """Have all patches that show the same as this one use one range of colors, which suits all of them"""
-
-    bl_idname = "tactile.share_range"
-    bl_label = "Same Range for All Patches"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return has_patch(cls, context, "Select a patch, or its probe")
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        patch = probe.patch_near(context.view_layer.objects.active)
-        count = color_range.share(patch, context.view_layer.objects)
-        return report_done(self, f"One range of colors for {many(count, 'patch', 'patches')}")
-
-
 OPERATORS = (
     TACTILE_OT_add_plane,
     TACTILE_OT_add_planes,
@@ -267,6 +263,6 @@ OPERATORS = (
     TACTILE_OT_update,
     TACTILE_OT_add_subdivision,
     TACTILE_OT_delete,
+    TACTILE_OT_activate,
     TACTILE_OT_show_colors,
-    TACTILE_OT_share_range,
 )

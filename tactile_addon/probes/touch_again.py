@@ -11,7 +11,6 @@ import numpy as np
 from mathutils import Matrix
 
 from ..scene import patch_object, patch_record
-from ..scene.family import all_objects
 from ..touch.evaluated_mesh import checksum_of, is_disabled, require_in_scene, require_invertible
 from ..touch.settings import touch_arguments
 from ..touch.touch_object import Touched, completed, touch
@@ -74,7 +73,7 @@ def adopt(probe: Object, touched: Touched, depsgraph: bpy.types.Depsgraph, compl
     probe.empty_display_size = 0.6 * touched.report["extent"]
     patch = patch_of(probe)
     if patch is None:
-        patch = patch_object.insert(depsgraph.scene, touched, parent=probe, lines=_left_contours(probe))
+        patch = patch_object.insert(depsgraph.scene, touched, parent=probe)
     else:
         patch_object.rewrite(patch, touched)
     anchor.keep(probe, patch)
@@ -102,13 +101,6 @@ def stand_by(probe: Object, outdated: bool, complete: bool) -> None:
         )
     elif not settings.message:
         patch_record.mark_current(patch)
-
-
-def _left_contours(probe: Object) -> Object | None:
-    """The contours of a patch that was deleted, if they are still there, or None."""
-    left = (obj for obj in all_objects() if patch_record.CONTOURS in obj and obj.parent is None)
-    own = (obj for obj in left if obj.is_editable and obj.data is not None)
-    return next((obj for obj in own if obj.data.get(DIGEST) == _signed(probe.tactile_probe)[0]), None)
 
 
 def touch_at(probe: Object, depsgraph: bpy.types.Depsgraph, complete: bool, **more: Any) -> Touched:
@@ -166,8 +158,7 @@ def may_be_outdated(probe: Object, there: Container[Object]) -> bool:
 def is_outdated(probe: Object, depsgraph: bpy.types.Depsgraph) -> bool:
     """Whether the patch is that of other inputs than the probe has, by the digests of both."""
     (touched, name), made, patch = _signed(probe.tactile_probe), _made(probe), patch_of(probe)
-    meshes = patch_object.meshes(patch)
-    if name != probe.name and (not meshes or any(mesh.users > 1 for mesh in meshes)):
+    if name != probe.name and (patch is None or patch.data.users > 1):
         return True  # It is a copy, which has no patch of its own yet.
     digest = _digest(probe, depsgraph, anchor.seat(probe, patch_record.extent_of(patch)))
     return any(other != digest for other in (touched, *(block.get(DIGEST) for block in made)))
@@ -176,7 +167,7 @@ def is_outdated(probe: Object, depsgraph: bpy.types.Depsgraph) -> bool:
 def _made(probe: Object) -> list[bpy.types.ID]:
     """The datablocks that a touch of the probe writes to."""
     patch = patch_of(probe)
-    return [] if patch is None else [patch, *patch_object.meshes(patch)]
+    return [] if patch is None else [patch, patch.data]
 
 
 def _sign(probe: Object, depsgraph: bpy.types.Depsgraph) -> None:

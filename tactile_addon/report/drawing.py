@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike
 from ..scene.colors import shades
 from ..touch.types import Array
 
-PIXELS = 320  # The width and height of a picture.
+PIXELS, BORDER = 320, 5.0  # The width and height of a picture, and what is free around its triangles.
 BINS, BAR_WIDTH, HEIGHT = 41, 12, 150  # The number of bars of a histogram, their width and largest height.
 
 
 def triangles(points: Array, corners: Array, colors: Array, marks: ArrayLike = ()) -> str:
     """A picture of triangles (m, 3) between points (n, 2), in colors (m, 3 or 4), with marks (k, 2)."""
-    place = fitted(points, PIXELS, 5.0)
+    place = _fitted(points)
     outlines = ("L".join(f"{x:.1f} {y:.1f}" for x, y in place(points[three])) for three in corners)
     shapes = [
         f'<path d="M{outline}Z" fill="{_hex(color)}" stroke="{_hex(color)}"/>'
@@ -64,11 +64,11 @@ def scale(limit: float, label: Callable[[float], str], low: float = -1.0) -> str
     return f'<svg viewBox="0 0 {PIXELS} 32" width="{PIXELS}">{"".join([*boxes, *words])}</svg>'
 
 
-def fitted(points: Array, pixels: float, border: float) -> Callable[[Array], Array]:
+def _fitted(points: Array) -> Callable[[Array], Array]:
     """A function that takes points (n, 2) into the middle of a square picture, with y upward."""
     low, high = points.min(axis=0), points.max(axis=0)
-    factor = (pixels - 2.0 * border) / max((high - low).max(), 1e-300)
-    return lambda at: pixels / 2.0 + factor * (at - 0.5 * (low + high)) * (1.0, -1.0)
+    factor = (PIXELS - 2.0 * BORDER) / max((high - low).max(), 1e-300)
+    return lambda at: PIXELS / 2.0 + factor * (at - 0.5 * (low + high)) * (1.0, -1.0)
 
 
 def _hex(color: Sequence[float]) -> str:

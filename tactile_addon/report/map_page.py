@@ -23,7 +23,7 @@ from . import page, parts, views
 def map_page(painted: Object) -> str:
     """The page of a map object."""
     record = painted[patch_record.MAP_RECORD].to_dict()
-    unit = units.unit_of(bpy.context.scene, record["spacing"])
+    unit = units.unit_of_report(bpy.context.scene, record)
     sections = [
         page.verdict(map_summary(record), record["patches"] > 0 and not record["in_doubt"]),
         page.section(

@@ -30,7 +30,7 @@ SHOWN = (
 def patch_page(patch: Object, r: core.Reconstruction) -> str:
     """The page of a patch object and its core.Reconstruction."""
     record = patch[patch_record.RECORD].to_dict()
-    unit = units.unit_of(bpy.context.scene, r.radius)
+    unit = units.unit_of_report(bpy.context.scene, record)
     off, weights, words = _deviations(patch, r, record)
     bands = parts.bands(off, weights, r.mean_height_std, unit, parts.shares_of(r.radius, "radius"))
     sections = [

@@ -38,7 +38,7 @@ class TACTILE_OT_export_report(ObjectExport, bpy.types.Operator):
     filename_ext = ".html"
     filter_glob: StringProperty(default="*.html", options={"HIDDEN"})
 
-    hint = "Select a patch, its probe or its contours, a stability map or a touched object first"
+    hint = "Select a patch, its probe, a stability map or a touched object first"
 
     @staticmethod
     def written(context: bpy.types.Context) -> Object | None:

@@ -17,14 +17,13 @@ HEIGHT_STD = "height_std"
 COLOR = "curvature_color"
 NORMAL, PLACE = "custom_normal", "domain_place"  # Normals for shading; places on the unit disk.
 NODE = "patch"  # The node of a whole object's graph whose patch counts most.
-CONTOUR, CONTACT = "contour", "contact"  # Numbers of contours, and of contacts along them, -1 for none.
 MEASURES = ("error", HEIGHT_STD, "reach", "condition_number", "blind_share")  # Of a stability map,
 REASON, TOUCH, MAP_COLOR = "reason", "touch", "stability_color"  # and so are these.
 TYPES: dict[str, Any] = {
     **dict.fromkeys((*CURVATURES, GAUSSIAN_STD, CURVATURE_STD, DEVIATION, HEIGHT_STD, *MEASURES), "FLOAT"),
     **dict.fromkeys((POSITION, NORMAL, PLACE), "FLOAT_VECTOR"),
     **dict.fromkeys((COLOR, MAP_COLOR), "FLOAT_COLOR"),
-    **dict.fromkeys((NODE, CONTOUR, CONTACT, REASON, TOUCH), "INT"),
+    **dict.fromkeys((NODE, REASON, TOUCH), "INT"),
 }
 # The property of an attribute's data that has its values, by the attribute's type.
 KEYS = {

@@ -14,9 +14,6 @@ COLOR_STOPS = np.array([
     (253, 219, 199), (244, 165, 130), (214, 96, 77), (178, 24, 43),
 ]) / 255.0  # fmt: skip
 
-# Values are as good as 0 if no more than the share FEW, which the range leaves out, are beyond this number of
-# deviations. Neighbors are alike, so more of them are beyond two deviations than chance would have.
-SIGNIFICANT, FEW = 3.0, 0.02
 UNKNOWN = (0.5, 0.5, 0.5, 1.0)  # The color of what has no value, in sRGB.
 
 
@@ -29,19 +26,6 @@ def symmetric_range(values: Array, floor: float) -> float:
     sizes.partition([before, min(before + 1, len(sizes) - 1)])
     one, other = sizes[before], sizes[min(before + 1, len(sizes) - 1)]
     return max(float(one + (at - before) * (other - one)), floor)
-
-
-def range_by_area(values: Array, areas: Array, floor: float) -> float:
-    """The r of a scale -r..r that holds for 98 % of an area, by values (n,) of its parts with areas (n,)."""
-    sizes = np.abs(values)
-    order = np.argsort(sizes)
-    areas = np.cumsum(areas[order])
-    return max(float(sizes[order[np.searchsorted(areas, (1.0 - FEW) * areas[-1])]]), floor)
-
-
-def are_as_good_as_0(values: Array, stds: Array) -> bool:
-    """Whether nearly all values (n,) differ from 0 by less than their deviations (n,)."""
-    return bool(np.mean(np.abs(values) > SIGNIFICANT * stds) <= FEW)
 
 
 def shades(values: ArrayLike, limit: float) -> Array:

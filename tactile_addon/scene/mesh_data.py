@@ -77,7 +77,7 @@ def emission(
     """The material of this name, made if missing, which shows a color attribute or one color as it is.
 
     Eevee and Cycles draw what has it above the mesh in which it lies, by the object's length ABOVE: along its
-    normals, or upright, which is along the object's z, as a patch and its thin contours are. Solid shading
+    normals, or upright, which is along the object's z, as a patch is. Solid shading
     draws it in front instead, or viewport/above does. None of these changes its geometry.
     """
     material: Any = bpy.data.materials.get(name)

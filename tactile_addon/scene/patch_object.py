@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reconstruction as objects of the scene: the patch, and the tracked contours."""
+"""The reconstruction as an object of the scene: the patch."""
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import bpy
 import numpy as np
@@ -13,127 +13,92 @@ from ... import core
 from ..touch.touch_object import Touched
 from ..touch.types import Array, Object
 from .attributes import COLOR, DEVIATION, GAUSSIAN_STD, HEIGHT_STD, NORMAL, PLACE, POSITION
-from .contour_mesh import fill_contours
+from .curves import CURVES, curves_of
 from .family import add
 from .mesh_data import ABOVE, emission, fill, own_mesh, values, write
 from .patch_record import (
-    CONTOURS,
     QUANTITIES_OF_A_FIT,
     RECONSTRUCTION,
     RECORD,
     VERDICT,
-    _place_contours,
-    contours_of,
     matrix_of,
-    parts_of,
     place,
 )
-from .shown import recolor, settle
+from .shown import recolor, share
 from .undo import note_added
 from .viewports import show_colors
 
 COLLECTION = "Tactile Patches"
-CONTOUR_COLOR = (0.02, 0.02, 0.02, 1.0)
 # It is drawn above the mesh by as much as it may be below it: by these shares of its radius at least and at
 # most, and by this multiple of its height's deviation until it is compared with the mesh.
 DRAWN_ABOVE, MOST_ABOVE, DEVIATIONS = 5e-3, 0.12, 3.0
 STEEP = 1.7  # Where a patch is steep, it has to go up by more, by this factor.
 
 
-def insert(
-    scene: bpy.types.Scene, touched: Touched, parent: Object | None = None, lines: Object | None = None
-) -> Object:
-    """Adds a patch and its contours to `scene`, in a collection of their own, and returns the patch object.
-
-    lines : an object of contours that has lost its patch, to be used for this one
-    """
-    name = touched.report["source"]
-    patch = _new(scene, f"{name} Patch", emission("Tactile Curvature", attribute=COLOR, upright=True))
-    lines = lines or _new(
-        scene, f"{name} Contours", emission("Tactile Contour", color=CONTOUR_COLOR, upright=True)
-    )
-    patch.parent, lines.parent, lines[CONTOURS] = parent, patch, True
-    for obj in (patch, lines):
-        add(obj)
+def insert(scene: bpy.types.Scene, touched: Touched, parent: Object | None = None) -> Object:
+    """Adds a patch to `scene`, in a collection of its own, and returns the patch object."""
+    name = f"{touched.report['source']} Patch"
+    patch: Object = bpy.data.objects.new(name, bpy.data.meshes.new(name))
+    patch.show_in_front = True  # It would lie in the surface it describes.
+    collection(scene).objects.link(patch)
+    patch.data.materials.append(emission("Tactile Curvature", attribute=COLOR, upright=True))
+    note_added(patch)
+    patch.parent = parent
+    add(patch)
     rewrite(patch, touched)
     show_colors()
     return patch
 
 
-def _new(scene: bpy.types.Scene, name: str, material: bpy.types.Material) -> Object:
-    obj: Object = bpy.data.objects.new(name, bpy.data.meshes.new(name))
-    obj.show_in_front = True  # It would lie in the surface it describes.
-    collection(scene).objects.link(obj)
-    obj.data.materials.append(material)
-    note_added(obj)
-    return obj
-
-
 def remove_objects(objects: Sequence[Object]) -> None:
-    """Deletes objects, with those of their meshes and materials that nothing else uses."""
+    """Deletes objects, with what nothing else uses: their meshes, materials, and an empty collection."""
     meshes = [obj.data for obj in objects if obj.data is not None]
     for obj in objects:
         bpy.data.objects.remove(obj)
-    remove_meshes(meshes)
-
-
-def remove_meshes(meshes: Iterable[bpy.types.Mesh]) -> None:
-    """Deletes the meshes that nothing uses, and those of their materials that nothing uses then."""
     meshes = [mesh for mesh in meshes if not mesh.users]
     materials = {material for mesh in meshes for material in mesh.materials if material is not None}
     bpy.data.batch_remove(meshes)
     bpy.data.batch_remove([material for material in materials if not material.users])
+    empty = [c for c in bpy.data.collections if _is_own(c) and not (c.objects or c.children)]
+    bpy.data.batch_remove(empty)
+
+
+def _is_own(collection: bpy.types.Collection) -> bool:
+    """Whether a collection is one of patches that can be used: no library's, nor the override of one."""
+    is_ours = collection.is_editable and collection.override_library is None
+    return is_ours and collection.name.partition(".")[0] == COLLECTION  # There may be a second one.
 
 
 def rewrite(patch: Object, touched: Touched) -> None:
-    """Changes the patch, and its contours if they are still there, to those of another touch, in place."""
-    lines = contours_of(patch)
-    for obj in parts_of(patch):
-        own_mesh(obj)
+    """Changes the patch to that of another touch, in place."""
+    own_mesh(patch)
     if touched.report["is_verified"] or PLACE not in patch.data.attributes:
         _fill_patch(patch, touched)
     else:
         _follow(patch, touched)
-    names = {"patch": patch.name}
-    if lines is not None:
-        fill_contours(lines.data, touched)
-        _place_contours(lines)
-        names["contours"] = lines.name
+    patch[CURVES] = curves_of(touched.result)
     place(patch, Matrix(matrix_of(touched.result.frame.axes, touched.result.frame.origin).tolist()))
-    for obj in parts_of(patch):
-        obj[ABOVE] = _above(patch, touched)
-    patch[RECORD] = touched.report | names
+    patch[ABOVE] = _above(patch, touched)
+    patch[RECORD] = touched.report | {"patch": patch.name}
     patch.pop(RECONSTRUCTION, None)
     patch.pop(VERDICT, None)
     recolor(patch)
     if touched.report["is_verified"]:
         patch[RECONSTRUCTION] = json.dumps(core.to_dict(touched.result), allow_nan=False)
-        settle(patch)
+        share(patch)
 
 
 def _above(patch: Object, touched: Touched) -> float:
-    """How far above the mesh a patch and its contours are drawn where they would lie in it."""
+    """How far above the mesh a patch is drawn where it would lie in it."""
     radius, deepest = touched.result.radius, DEVIATIONS * touched.report["height_std"]
     if touched.report["is_verified"] and touched.surface is not None:
         deepest = max(deepest, -STEEP * float(values(patch.data, DEVIATION).min()))
     return min(max(deepest, DRAWN_ABOVE * radius), MOST_ABOVE * radius)
 
 
-def meshes(patch: Object | None) -> list[bpy.types.Mesh]:
-    """The meshes of a patch object and of its contours; an empty list if `patch` is None."""
-    return [obj.data for obj in parts_of(patch)]
-
-
 def collection(scene: bpy.types.Scene) -> bpy.types.Collection:
     """The collection of a scene's patches, made if there is none."""
-    # In the file's second scene it is "Tactile Patches.001". That of a library, or its override, cannot be
-    # used.
-    named = (
-        c
-        for c in scene.collection.children_recursive
-        if c.name.partition(".")[0] == COLLECTION and c.is_editable and c.override_library is None
-    )
-    found = next(named, None)
+    found = next(filter(_is_own, scene.collection.children_recursive), None)
     if found is None:
         found = bpy.data.collections.new(COLLECTION)
         scene.collection.children.link(found)
@@ -175,8 +140,6 @@ def _follow(obj: Object, touched: Touched) -> None:
     write(mesh, NORMAL, d.normal)
     if obj.tactile_colors in QUANTITIES_OF_A_FIT:
         write(mesh, obj.tactile_colors, _shown(obj.tactile_colors, result, points))
-    if obj.tactile_colors == "gaussian_curvature":
-        write(mesh, GAUSSIAN_STD, core.gaussian_curvature_stds(result, *plane.T))
 
 
 def _shown(name: str, result: core.Reconstruction, points: Array) -> Array:

@@ -14,22 +14,21 @@ from ... import core
 from ..touch.touch_report import TouchReport
 from ..touch.types import Array, Object
 from .attributes import COLOR, CORNERS, CURVATURES, DEVIATION, DOMAIN, HEIGHT_STD, attribute_of
-from .family import children_of
 
 # Custom properties of objects.
 RECORD = "tactile"  # The report of a patch.
 RECONSTRUCTION = "tactile_reconstruction"  # Its core.to_dict as JSON, once a gesture has ended.
 VERDICT = "tactile_verdict"  # Its status and message, while the report says that it is outdated.
 RANGE = "tactile_color_range"  # The range of its colors, if that is given.
-COMMON_RANGE = "tactile_common_range"  # The range that suits all patches of its mesh.
+COMMON_RANGE = "tactile_common_range"  # That of curvatures on all patches of its mesh, in 1/length.
 MAP_RECORD = "tactile_map"  # The report of a stability map.
 ATLAS_RECORD = "tactile_object"  # The report of a whole object.
 GRAPH = "tactile_graph"  # The graph of a whole object, core.Atlas.to_dict as JSON.
-CONTOURS = "tactile_contours"  # The custom property that contours have and other children of a patch do not.
-# What the colors can show: attribute, name, description, and the power of length in its unit.
+# What the colors can show: attribute, name, description, and the power of length in its unit. The first is
+# shown at first: of all it alone differs between flat, rolled, round and hollow surfaces.
 QUANTITIES = [
-    ("gaussian_curvature", "Gaussian Curvature", "K: red on domes and bowls, blue on saddles", -2),
     ("mean_curvature", "Mean Curvature", "H: blue where the surface bulges outward, red where inward", -1),
+    ("gaussian_curvature", "Gaussian Curvature", "K: red on domes and bowls, blue on saddles", -2),
     (
         "shape_index",
         "Shape Index",
@@ -168,15 +167,6 @@ def hold(patch: Object) -> None:
     axes, origin = touched_frame(patch)
     if not is_at(patch, axes, origin):
         place(patch, Matrix(matrix_of(axes, origin).tolist()))
-    _place_contours(contours_of(patch))
-
-
-def _place_contours(lines: Object | None) -> None:
-    """Puts contours where their patch is, because they are in its coordinates."""
-    if lines is None or lines.constraints or lines.animation_data:
-        return
-    if lines.matrix_basis != Matrix() or lines.matrix_parent_inverse != Matrix():
-        lines.matrix_parent_inverse = lines.matrix_basis = Matrix()
 
 
 def touched_frame(patch: Object) -> tuple[Array, Array]:
@@ -204,16 +194,6 @@ def is_at(patch: Object, axes: Array, origin: Array) -> bool:
     """Whether the patch object is at a frame of the world, except for rounding."""
     near = {"rtol": 1e-6, "atol": 1e-6 * patch[RECORD]["radius"]}
     return np.allclose(patch.matrix_world, matrix_of(axes, origin), **near)
-
-
-def contours_of(patch: Object) -> Object | None:
-    """The contours of a patch object, or None."""
-    return next((child for child in children_of(patch) if CONTOURS in child), None)
-
-
-def parts_of(patch: Object | None) -> list[Object]:
-    """The patch object and its contours, if it has any; an empty list if `patch` is None."""
-    return [] if patch is None else list(filter(None, (patch, contours_of(patch))))
 
 
 def matrix_of(axes: Array, origin: Array) -> Array:

@@ -9,7 +9,7 @@ import bpy
 
 NEAREST, FARTHEST = 0.02, 20.0  # The distances, in sizes of an object, between which it is shown.
 # If a view is clipped nearer than at this share of the size, which Blender itself does not do below 1 cm, its
-# depths are so coarse that a patch and its contours run through each other.
+# depths are so coarse that a patch and the mesh run through each other.
 COARSE, OWN = 5e-4, 0.01
 GESTURES = ("TRANSFORM_OT_", "TACTILE_OT_")
 

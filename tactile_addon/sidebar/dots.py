@@ -7,7 +7,7 @@ from typing import Any
 import bpy.utils.previews
 import numpy as np
 
-from ..viewport.overlay import PLANE_COLORS
+from ..viewport.curves import PLANE_COLORS
 
 SIDE, RADIUS = 32, 10.0  # of the icon and of its dot, in pixels
 _icons = None

@@ -11,25 +11,27 @@ from bpy.app.translations import pgettext_iface as iface
 from ..comparison.register_operator import TACTILE_OT_register
 from ..comparison.verification_wording import verification_rows, verification_table
 from ..comparison.verify_operator import TACTILE_OT_verify
-from ..probes import number_fields, probe
+from ..files.export_operators import TACTILE_OT_export_table
+from ..probes import probe
 from ..probes.operators import NO_MESH
 from ..probes.probe_operators import (
+    TACTILE_OT_activate,
     TACTILE_OT_add_plane,
     TACTILE_OT_add_subdivision,
     TACTILE_OT_delete,
     TACTILE_OT_remove_plane,
-    TACTILE_OT_share_range,
     TACTILE_OT_show_colors,
     TACTILE_OT_update,
 )
+from ..report.report_operator import TACTILE_OT_export_report
 from ..scene import patch_record
-from ..scene.color_range import range_field, unit_of_range
+from ..scene.shown import unit_of_range
 from ..scene.viewports import shows_colors
 from ..stability_map.map_operator import TACTILE_OT_stability_map
 from ..stability_map.map_report import facets as map_facets
 from ..stability_map.map_report import map_rows, median_rows
 from ..touch import units
-from ..touch.settings import draw_chosen, draw_sensor, draw_solver
+from ..touch.settings import draw_chosen, draw_fit, draw_noise
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object, PanelMixin
 from ..touch.units import Unit
@@ -46,6 +48,7 @@ TAB = "Tactile"
 FACETED = {"facets", "folds"}  # A Subdivision modifier may take these doubts away.
 HELP = "Click on a mesh: a probe feels its surface there and keeps a patch of it with its curvatures"
 OTHER_MODE = "Objects are touched in Object Mode, so the buttons are gray"
+VERDICT_LINES = 2  # The verdict has this room, so that nothing below it jumps while a probe is dragged.
 ICONS = {"ok": "CHECKMARK"}
 
 
@@ -82,17 +85,15 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         settings, record = found.tactile_probe, probe.record_of(found)
         layout.prop(settings, "target")
         chosen = found_values(record, context.scene)
-        fields = {}  # The override of a library's probe keeps numbers, but not the properties that show them.
-        if found.override_library is None:
-            fields = number_fields.fields(_size_of(settings.target, record)) | {"degree": "degree_shown"}
-        draw_chosen(layout, settings, "extent", chosen, fields)
+        draw_chosen(layout, settings, "extent", chosen)
         _draw_planes(layout, settings)
         row = layout.row()
         row.prop(settings, "live", text="Live" if settings.live else "Live (Frozen)")
         row.operator(TACTILE_OT_update.bl_idname, text="", icon="FILE_REFRESH")
-        for identifier, title, draw in (("sensor", "Sensor", draw_sensor), ("solver", "Fit", draw_solver)):
-            if body := _folded(layout, identifier, title):
-                draw(body, settings, chosen, fields)
+        if body := _folded(layout, "fit", "Sensor and Fit"):
+            draw_chosen(body, settings, "step", chosen)
+            draw_noise(body, settings)
+            draw_fit(body, settings, chosen)
 
 
 def _folded(layout: bpy.types.UILayout, identifier: str, title: str) -> bpy.types.UILayout | None:
@@ -109,12 +110,6 @@ def _draw_pick(context: bpy.types.Context, layout: bpy.types.UILayout, obj: Obje
         draw_sentence(context, layout, NO_MESH, "INFO")
     elif obj is None or not probe.is_result(obj):
         draw_sentence(context, layout, HELP, "INFO")
-
-
-def _size_of(target: Object | None, record: TouchReport | None) -> float:
-    if target is not None:
-        return max(target.dimensions)
-    return 0.0 if record is None else record["radius"]
 
 
 def _draw_planes(layout: bpy.types.UILayout, settings: Any) -> None:
@@ -153,26 +148,20 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         if record is None:
             layout.label(text="This patch was edited: touch again", icon="ERROR")
             return
-        unit = units.unit_of(context.scene, record["radius"])
+        unit = units.unit_of_report(context.scene, record)
         is_outdated = record["status"] == "outdated"
         if not (is_outdated and failed):  # The failure stands above already.
-            draw_sentence(context, layout, verdict(record, unit), ICONS.get(record["status"], "ERROR"))
+            icon = ICONS.get(record["status"], "ERROR")
+            draw_sentence(context, layout, verdict(record, unit), icon, lines=VERDICT_LINES)
         if found is not None:
             _draw_remedy(layout, record)
-        _draw_colors(context, layout, patch, "tactile_colors")
-        _draw_range(context, layout, patch)
-        _draw_shown(layout, found, patch)
-        if is_outdated:  # These numbers are outdated.
-            layout.label(text="Last Touch")
         draw_rows(context, layout, main_rows(record, unit), active=not is_outdated)
-        _draw_details(context, layout, record, unit)
-        layout.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
-        if found is None:
-            layout.prop_search(patch, "tactile_target", context.scene, "objects")
-            layout.operator(TACTILE_OT_register.bl_idname, icon="SNAP_ON")
-        _draw_comparison(context, layout, record, unit)
-        if found is not None:
-            draw_rows(context, layout, plane_rows(record, unit), active=not is_outdated)
+        _draw_colors(context, layout, patch, "tactile_colors")
+        _draw_shown(layout, found, patch)
+        if body := _folded(layout, "more", "More"):
+            _draw_more(context, body, patch, record, unit)
+        if found is None or "verification" in record or "registration" in record:
+            _draw_comparison(context, layout, patch, record, unit)
 
 
 def _draw_remedy(layout: bpy.types.UILayout, record: Mapping[str, Any]) -> None:
@@ -199,15 +188,19 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
             draw_sentence(context, layout, words, "INFO")
             layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
         _draw_colors(context, layout, obj, "tactile_colors")
-        if patch_record.is_colored(obj):
-            _draw_range(context, layout, obj)
-        draw_rows(context, layout.box(), object_rows(record))
-        if "touches" not in record:  # Measured contacts have no mesh to touch.
-            return
-        text = f"Largest {'Gap' if record['uncovered'] else 'Deviation'}: {deviation(record, 'max')}"
-        layout.operator(TACTILE_OT_look_farthest.bl_idname, text=text, icon="ZOOM_SELECTED", translate=False)
-        layout.operator(TACTILE_OT_mesh_again.bl_idname, icon="MOD_REMESH")
-        layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Surface", icon="EYEDROPPER").new = True
+        if "touches" in record:  # Measured contacts have no mesh to touch.
+            text = f"Largest {'Gap' if record['uncovered'] else 'Deviation'}: {deviation(record, 'max')}"
+            layout.operator(
+                TACTILE_OT_look_farthest.bl_idname, text=text, icon="ZOOM_SELECTED", translate=False
+            )
+            layout.operator(
+                TACTILE_OT_pick.bl_idname, text="Probe on the Surface", icon="EYEDROPPER"
+            ).new = True
+        if body := _folded(layout, "object_more", "More"):
+            if patch_record.is_colored(obj):
+                _draw_range(context, body, obj)
+            draw_rows(context, body, object_rows(record))
+            body.operator(TACTILE_OT_mesh_again.bl_idname, icon="MOD_REMESH")
 
 
 class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
@@ -219,29 +212,57 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
         if obj is None or patch_record.MAP_RECORD not in obj:
             return
         layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Map", icon="EYEDROPPER").new = True
-        _draw_colors(context, layout, obj, "tactile_map_colors")
         record = obj[patch_record.MAP_RECORD]
+        unit = units.unit_of_report(context.scene, record)
         if words := map_facets(record):
             draw_sentence(context, layout, words, "ERROR")
-        box, unit = layout.box(), units.unit_of(context.scene, record["spacing"])
-        draw_rows(context, box, map_rows(record, unit))
-        medians, more = median_rows(record, unit), median_rows(record, unit, more=True)
-        if medians:
-            box.label(text="Medians of the Patches")
-            draw_rows(context, box, medians)
-        if more and (body := _folded(layout, "medians", "More")):
-            draw_rows(context, body, more)
+        draw_rows(context, layout, map_rows(record, unit))
+        _draw_colors(context, layout, obj, "tactile_map_colors")
+        medians = list(median_rows(record, unit))
+        if medians and (body := _folded(layout, "medians", "Medians of the Patches")):
+            draw_rows(context, body, medians)
 
 
-def _draw_details(
-    context: bpy.types.Context, layout: bpy.types.UILayout, record: Mapping[str, Any], unit: Unit
+class TACTILE_PT_probes(_Sidebar, bpy.types.Panel):
+    bl_idname = "TACTILE_PT_probes"
+    bl_label = "Probes"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
+        """Draws a row for each probe, to click: its verdict as an icon, its name and its curvatures."""
+        column = layout.column(align=True)
+        for found in sorted(filter(probe.is_probe, context.view_layer.objects), key=lambda each: each.name):
+            record = probe.record_of(found)
+            icon, words = "ERROR", found.tactile_probe.message
+            if record is not None:
+                icon = ICONS.get(record["status"], "ERROR")
+                rows = main_rows(record, units.unit_of_report(context.scene, record))
+                words = "   ".join(f"{label} {value}" for label, value in rows)
+            row = column.operator(
+                TACTILE_OT_activate.bl_idname,
+                text=f"{found.name}   {words}",
+                icon=icon,
+                depress=found == probe.probe_of(obj),
+                translate=False,
+            )
+            row.name = found.name
+        row = layout.row(align=True)
+        row.operator(TACTILE_OT_export_table.bl_idname, text="Table", icon="EXPORT")
+        row.operator(TACTILE_OT_export_report.bl_idname, text="Report", icon="FILE_TEXT")
+
+
+def _draw_more(
+    context: bpy.types.Context, layout: bpy.types.UILayout, patch: Object, record: TouchReport, unit: Unit
 ) -> None:
-    """Draws what the fit says of itself, and all other numbers, folded away."""
-    if body := _folded(layout, "why", "Reasons"):
-        for i, words in enumerate(reasons(record)):
-            draw_sentence(context, body, words, "BLANK1" if i else ICONS.get(record["status"], "ERROR"))
-    if body := _folded(layout, "numbers", "More Numbers"):
-        draw_rows(context, body, other_rows(record, unit), active=record["status"] != "outdated")
+    """Draws what the fit says of itself, the range of the colors, and all other numbers."""
+    is_current = record["status"] != "outdated"
+    _draw_range(context, layout, patch)
+    for i, words in enumerate(reasons(record)):
+        draw_sentence(context, layout, words, "BLANK1" if i else ICONS.get(record["status"], "ERROR"))
+    rows = [*other_rows(record, unit), *plane_rows(record, unit)]
+    draw_rows(context, layout, rows, active=is_current)
+    if probe.probe_of(patch) is not None:
+        layout.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
 
 
 def _draw_colors(context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object, name: str) -> None:
@@ -252,34 +273,32 @@ def _draw_colors(context: bpy.types.Context, layout: bpy.types.UILayout, obj: Ob
 
 
 def _draw_range(context: bpy.types.Context, layout: bpy.types.UILayout, patch: Object) -> None:
-    """Draws where the colors end, and a button for one range on all patches."""
-    row = layout.row(align=True)
+    """Draws where the colors end."""
+    row = layout.row()
     row.use_property_split = False
-    power, unit = unit_of_range(patch, context.scene)
-    shown, factor = range_field(patch)
     name = iface("Range" if patch_record.RANGE in patch else "Range (Auto)")
-    symbol = units.symbol(power, unit)
-    if factor:
-        symbol = f"{factor}{symbol[1:]}" if symbol.startswith("1/") else f"{factor} {symbol}"
-    row.prop(patch, shown, text=f"{name} {symbol}".rstrip(), translate=False)
-    if patch_record.RECORD in patch:
-        row.operator(TACTILE_OT_share_range.bl_idname, text="", icon="LINKED")
+    symbol = units.symbol(*unit_of_range(patch, context.scene))
+    row.prop(patch, "tactile_range", text=f"{name} {symbol}".rstrip(), translate=False)
 
 
 def _draw_shown(layout: bpy.types.UILayout, found: Object | None, patch: Object) -> None:
     """Draws the switches of what is shown with a patch and may hide it."""
     row = layout.row(align=True)
     row.use_property_split = False
-    if patch_record.contours_of(patch) is not None:
-        row.prop(patch, "tactile_contours", icon="CURVE_DATA", toggle=1)
+    row.prop(patch, "tactile_contours", icon="CURVE_DATA", toggle=1)
+    row.prop(patch, "tactile_directions", icon="EMPTY_AXIS", toggle=1)
     if found is not None:
         row.prop(found.tactile_probe, "show_handles", icon="GIZMO", toggle=1)
 
 
 def _draw_comparison(
-    context: bpy.types.Context, layout: bpy.types.UILayout, record: Mapping[str, Any], unit: Unit
+    context: bpy.types.Context, layout: bpy.types.UILayout, patch: Object, record: TouchReport, unit: Unit
 ) -> None:
     """Draws where the patch was put on a mesh, and how far it is off one, if these are known."""
+    if probe.probe_of(patch) is None:
+        layout.prop_search(patch, "tactile_target", context.scene, "objects")
+        layout.operator(TACTILE_OT_register.bl_idname, icon="SNAP_ON")
+        layout.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
     if "registration" in record:
         draw_sentence(context, layout, registration_summary(record["registration"], unit), "SNAP_ON")
     if "verification" not in record:
@@ -297,4 +316,4 @@ def _draw_comparison(
     draw_rows(context, layout, verification_rows(record, unit))
 
 
-PANELS = (TACTILE_PT_probe, TACTILE_PT_result, TACTILE_PT_object, TACTILE_PT_map)
+PANELS = (TACTILE_PT_probe, TACTILE_PT_result, TACTILE_PT_object, TACTILE_PT_map, TACTILE_PT_probes)

@@ -17,22 +17,17 @@ FLATTEST = 1e-3  # Nor has one whose radius is a thousand times the patch's.
 
 
 def main_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
-    """(label, value) of what matters most, with lengths in a unit of units.py."""
-    rim = record.get("height_std_rim")
-    deviation = _said(record, "height_error", 1, unit) if "height_error" in record else "–"
-    return [
-        ("Principal Curvatures", ""),
-        ("κ1", _measured(record, "k1", -1, unit)),
-        ("κ2", _measured(record, "k2", -1, unit)),
-        ("Height", f"± {units.say(record['height_std'], 1, unit)}"),
-        ("At the Rim", "…" if rim is None else f"± {units.say(rim, 1, unit)}"),
-        ("Deviation", deviation),
-    ]
+    """(label, value) of the principal curvatures, with lengths in a unit of units.py."""
+    return [(label, _measured(record, key, -1, unit)) for label, key in (("κ1", "k1"), ("κ2", "k2"))]
 
 
 def other_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     """(label, value) of everything else."""
+    rim = record.get("height_std_rim")
     rows = [
+        ("Height", f"± {units.say(record['height_std'], 1, unit)}"),
+        ("At the Rim", "…" if rim is None else f"± {units.say(rim, 1, unit)}"),
+        ("Deviation", _said(record, "height_error", 1, unit) if "height_error" in record else "–"),
         *_radii(record, unit),
         ("K Gaussian", _measured(record, "gaussian_curvature", -2, unit)),
         ("H Mean", _measured(record, "mean_curvature", -1, unit)),
@@ -62,7 +57,7 @@ def found_values(record: Mapping[str, Any] | None, scene: bpy.types.Scene) -> di
     """The values that the last touch chose for numbers left to the surface, in words and by name."""
     if record is None or record["status"] == "outdated" or "step" not in record:
         return {}
-    unit = units.unit_of(scene, record["radius"])
+    unit = units.unit_of_report(scene, record)
     lengths = {name: units.say(record[name], 1, unit) for name in ("extent", "step")}
     return lengths | {"degree": str(record["degree"])}
 

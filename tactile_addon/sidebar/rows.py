@@ -12,7 +12,8 @@ import bpy
 from bpy.props import StringProperty
 
 from ..touch.types import Outcome
-from ..viewport.overlay import FONT, TEXT
+from ..viewport.curves import FONT
+from ..viewport.overlay import TEXT
 
 # About the width of a letter, and what is free around a text, in pixels at scale 1.
 LETTER, PADDING = 6.5, 12.0
@@ -115,11 +116,14 @@ def draw_rows(
         line.label(text=value, translate=False)
 
 
-def draw_sentence(context: bpy.types.Context, layout: bpy.types.UILayout, sentence: str, icon: Any) -> None:
-    """Draws a sentence in as many lines as the sidebar's width needs."""
+def draw_sentence(
+    context: bpy.types.Context, layout: bpy.types.UILayout, sentence: str, icon: Any, lines: int = 1
+) -> None:
+    """Draws a sentence in as many lines as the sidebar's width needs, and at least in as many as given."""
     column = layout.column(align=True)
     column.scale_y = 0.8
-    for i, line in enumerate(textwrap.wrap(sentence, max(16, int(_letters(context))))):
+    found = textwrap.wrap(sentence, max(16, int(_letters(context))))
+    for i, line in enumerate([*found, *[""] * (lines - len(found))]):
         column.label(text=line, icon=icon if i == 0 else "BLANK1")
 
 

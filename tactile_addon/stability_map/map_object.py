@@ -2,19 +2,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A stability map as an object: a painted copy of the mesh that was touched."""
 
-import math
 from typing import Any
 
 import bpy
 import numpy as np
 from bpy.props import EnumProperty
-from mathutils import Vector
+from mathutils import Matrix, Vector
 
 from ... import core
 from ..scene import colors, patch_object, patch_record
 from ..scene.attributes import CORNERS, HEIGHT_STD, MAP_COLOR, MEASURES, REASON, TOUCH
-from ..scene.mesh_data import ABOVE, emission, write
-from ..scene.shown import LEAST_RANGE
+from ..scene.mesh_data import ABOVE, emission, fill, write
+from ..scene.shown import LEAST_LENGTH
 from ..scene.viewports import show_colors
 from ..touch.arrays import read_array
 from ..touch.settings import MOST_PLANES
@@ -28,8 +27,10 @@ AREA = "area"  # the area in the world that has the color of each.
 # The map is shown this share of the object's size above the mesh. With less it flickers if it is 20000 clip
 # starts away, as a scan in mm is.
 SHOWN_ABOVE = 5e-3
-# What the colors can show: attribute, name, description, and the power of length in its unit.
+# What the colors can show: attribute, name, description, and the power of length in its unit. The first is
+# shown at first: where a patch can be trusted, and why not.
 MAP_QUANTITIES = [
+    (REASON, "Reason", "Whether there is a patch, and why there is none", 0),
     ("error", "Error", "Mean distance in height between patch and mesh", 1),
     (HEIGHT_STD, "Standard Deviation", "How well the contacts determine the height", 1),
     (
@@ -45,7 +46,6 @@ MAP_QUANTITIES = [
         0,
     ),
     ("blind_share", "Blind Share", "Share of the ways to bend that the planes cannot show", 0),
-    (REASON, "Reason", "Whether there is a patch, and why there is none", 0),
 ]
 LOGARITHMIC = ("condition_number",)  # These have a logarithmic scale from 1.
 # The range reaches at least to where the typical patch, that of the median by area, would be in doubt: this
@@ -63,21 +63,17 @@ REASON_COLORS = np.array([
 
 def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Object:
     """Adds a copy of `obj`, painted by the StabilityMap `touched`, to the scene, and returns it."""
-    depsgraph = context.evaluated_depsgraph_get()
-    evaluated = obj.evaluated_get(depsgraph)
-    mesh = bpy.data.meshes.new_from_object(evaluated, depsgraph=depsgraph)
-    painted = bpy.data.objects.new(f"{obj.name} Stability", mesh)
-    mesh.name = painted.name
-    painted.matrix_world = obj.matrix_world
-    # Under a parent the target may be sheared, which an object without one cannot be.
-    mesh.transform(painted.matrix_basis.inverted_safe() @ obj.matrix_world)
+    evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
+    mesh = bpy.data.meshes.new(f"{obj.name} Stability")
+    painted = bpy.data.objects.new(mesh.name, mesh)
+    painted.matrix_world = Matrix.Translation(touched.surface.origin.tolist())
+    areas = _paint(mesh, touched)
+    is_smooth = read_array(evaluated.data.polygons, "use_smooth", dtype=bool)[touched.owners]
+    mesh.polygons.foreach_set("use_smooth", is_smooth)
     # It would lie in the mesh it describes, so it is shown a little above it. It is not shown in front,
     # because patches that lie in it are.
-    painted[ABOVE] = SHOWN_ABOVE * math.dist(painted.bound_box[0], painted.bound_box[6])
-    areas = _paint(mesh, touched)
-    places = np.array(touched.places[: touched.done]).reshape(-1, 3) + touched.surface.origin
-    painted[PLACES] = _applied(np.linalg.inv(_array(painted.matrix_basis)), places).ravel().tolist()
-    mesh.materials.clear()
+    painted[ABOVE] = SHOWN_ABOVE * float(np.linalg.norm(np.ptp(touched.points, axis=0)))
+    painted[PLACES] = np.ravel(touched.places[: touched.done]).tolist()
     mesh.materials.append(emission("Tactile Stability", attribute=MAP_COLOR))
     painted[VALUES] = {name: touched.measures[name].tolist() for name in MEASURES}
     painted[VALUES].update({REASON: touched.reason.tolist(), AREA: areas.tolist()})
@@ -89,14 +85,14 @@ def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Ob
 
 
 def _paint(mesh: bpy.types.Mesh, touched: StabilityMap) -> Array:
-    """Gives each vertex the values of its touch, and each face the color of its own.
+    """Fills the mesh; each vertex has the values of its touch, and each triangle the color of its own.
 
     It returns the area (n,) that has the color of each touch.
     """
-    for name in MEASURES:
-        write(mesh, name, touched.measures[name][touched.touch_of])
-    write(mesh, REASON, touched.reason[touched.touch_of])
-    touch = np.repeat(touched.touch_in, read_array(mesh.polygons, "loop_total", dtype=np.int32))
+    attributes = [(name, touched.measures[name][touched.touch_of]) for name in MEASURES]
+    attributes.append((REASON, touched.reason[touched.touch_of]))
+    fill(mesh, touched.points, touched.triangles, attributes)
+    touch = np.repeat(touched.touch_in, 3)
     write(mesh, TOUCH, touch.astype(np.int32), CORNERS)
     write(mesh, MAP_COLOR, np.ones((len(touch), 4)), CORNERS)
     mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = MAP_COLOR
@@ -136,7 +132,7 @@ def _least_range(painted: Object, shown: str) -> float:
     """The smallest range of colors of a quantity, so that red stands for what is bad."""
     if shown in LOGARITHMIC:
         return 10.0
-    least = LEAST_RANGE * painted[patch_record.MAP_RECORD]["spacing"]
+    least = LEAST_LENGTH * painted[patch_record.MAP_RECORD]["spacing"]
     times, other = DOUBTFUL.get(shown, (0.0, shown))
     values = np.array(painted[VALUES][other])
     order = np.argsort(values)
@@ -157,40 +153,26 @@ def swatches(painted: Object) -> list[tuple[str, tuple[float, ...]]]:
     return [(f"{name}: {counts[key]}", tuple(c)) for (key, name, _), c in names if counts[key]]
 
 
-def touched_near(painted: Object, source: Object, location: list[float]) -> list[float]:
-    """The point at which a map was touched for the face of its source that is nearest to a location.
+def touched_near(painted: Object, location: list[float]) -> list[float]:
+    """The point at which a map was touched for its triangle that is nearest to a location.
 
-    The map shows the color of that point on this face. It is the location itself if the object is no map or
-    is hidden, or if it has other faces than its source. So it is if that point is farther away than the map
-    is large: the source was moved.
+    It is the location itself if the object is no map or is hidden, or if that point is farther away than the
+    map is large: the source was moved.
     """
     if TOUCH not in painted.data.attributes or not painted.visible_get():
         return location
-    depsgraph, faces = bpy.context.evaluated_depsgraph_get(), painted.data.polygons
-    evaluated = source.evaluated_get(depsgraph)
-    # The map itself is drawn above the source, so that in hollows another of its faces may be nearer.
-    is_found, _, _, face = evaluated.closest_point_on_mesh(
-        source.matrix_world.inverted_safe() @ Vector(location)
-    )
-    if not is_found or len(evaluated.data.polygons) != len(faces):
+    evaluated = painted.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    to_map = painted.matrix_world.inverted_safe()
+    is_found, _, _, face = evaluated.closest_point_on_mesh(to_map @ Vector(location))
+    if not is_found:
         return location
-    touch = painted.data.attributes[TOUCH].data[faces[face].loop_start].value
+    touch = painted.data.attributes[TOUCH].data[painted.data.polygons[face].loop_start].value
     found = painted.get(PLACES, ())[3 * touch : 3 * touch + 3]
     if len(found) < 3:  # It was joined with another object.
         return location
     place = painted.matrix_world @ Vector(found)
     is_near = (place - Vector(location)).length <= max(painted.dimensions)
     return list(place) if is_near else location
-
-
-def _array(matrix: Any) -> Array:
-    return np.array(matrix, dtype=float)
-
-
-def _applied(matrix: Array, points: Array) -> Array:
-    """Points (n, 3) as a matrix (4, 4) places them."""
-    placed: Array = points @ matrix[:3, :3].T + matrix[:3, 3]
-    return placed
 
 
 def inputs_of(painted: Object) -> dict[str, Any]:

@@ -7,7 +7,6 @@ import bpy
 from ...core.arguments import many
 from ..probes import probe
 from ..probes.in_slices import AllOver, Progress
-from ..probes.number_fields import dragged
 from ..probes.operators import (
     has_target,
     is_in_object_mode,
@@ -16,21 +15,21 @@ from ..probes.operators import (
     target_object,
 )
 from ..scene import patch_record
+from ..touch import units
 from ..touch.settings import (
     NAMES,
     TouchSettings,
-    draw_all,
     draw_chosen,
+    draw_noise,
     length_property,
     touch_arguments,
 )
 from ..touch.types import Outcome
 from . import map_object
 from .map_report import map_summary
-from .stability import StabilityMap, expected_count
+from .stability import StabilityMap, expected_count, seconds_each
 
 
-@dragged
 class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
     """Touch a mesh all over and paint a copy of it: where a patch can be trusted, and where there is none"""
 
@@ -45,7 +44,7 @@ class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
     )
 
     stop = "Stop and Keep"
-    _counted: tuple[object, int] = (None, 0)  # The points that were counted last, after what they depend on.
+    _counted: tuple[object, str] = (None, "")  # What was said last, after what it depends on.
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -91,14 +90,17 @@ class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
     def _about(self, context: bpy.types.Context) -> str:
         """A sentence on what will be touched at how many points."""
         target = target_object(context, self.target)
-        given = target.session_uid, self.extent, self.spacing
+        given = target.session_uid, self.extent, self.spacing, self.noise
         if given != self._counted[0]:  # A dialog is drawn often.
             depsgraph = context.evaluated_depsgraph_get()
-            self._counted = given, expected_count(target, depsgraph, self.extent, self.spacing)
-        return f"{target.name}: about {many(self._counted[1], 'touch', 'touches')}"
+            count = expected_count(target, depsgraph, self.extent, self.spacing)
+            seconds = count * seconds_each(target, depsgraph, touch_arguments(self))
+            words = f"about {many(units.rough(count), 'touch', 'touches')}, {units.duration(seconds)}"
+            self._counted = given, f"{target.name}: {words}"
+        return self._counted[1]
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout, fields = self.layout, self._draw_target(context)
-        draw_chosen(layout, self, "spacing", fields=fields)
-        layout.separator()
-        draw_all(layout, self, fields)
+        self._draw_target(context)
+        for name in ("spacing", "extent"):  # All else is as the active probe has it.
+            draw_chosen(self.layout, self, name)
+        draw_noise(self.layout, self)

@@ -19,7 +19,7 @@ FACETED = 0.5  # The share of the patches from which on a map says that they fol
 
 def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(label, value) of everything there is to say of a map."""
-    unit = units.unit_of(bpy.context.scene, record["spacing"])
+    unit = units.unit_of_report(bpy.context.scene, record)
     names = ("spacing", "extent", "step")
     lengths = [units.say(record[name], 1, unit) if record[name] else "auto" for name in names]
     return [
@@ -31,7 +31,7 @@ def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("refused", ", ".join(_refused(record)) or "none"),
         ("fit", fit(record)),
         (", ".join(names), ", ".join(lengths)),
-        *((f"median {title.lower()}", value) for _, title, value in _medians(record, unit)),
+        *((f"median {title.lower()}", value) for title, value in median_rows(record, unit)),
     ]
 
 
@@ -76,20 +76,10 @@ def facets(record: Mapping[str, Any]) -> str | None:
     return f"Curvature of the facets, not of the shape, at {many(count, 'point', 'points')}"
 
 
-def median_rows(record: Mapping[str, Any], unit: Unit, more: bool = False) -> list[tuple[str, str]]:
-    """(label, value) of the medians over the patches of a stability map: those in lengths, or all `more`."""
-    powers = map_object.MAP_POWERS
-    return [(title, value) for name, title, value in _medians(record, unit) if (powers[name] == 0) is more]
-
-
-def _medians(record: Mapping[str, Any], unit: Unit) -> Iterator[tuple[str, str, str]]:
-    """(attribute, title, value) of each median that is known."""
+def median_rows(record: Mapping[str, Any], unit: Unit) -> Iterator[tuple[str, str]]:
+    """(label, value) of the medians over the patches of a stability map that are known."""
     for name, title, _, power in map_object.MAP_QUANTITIES:
         if f"{name}_median" in record:
             found = record[f"{name}_median"]
             # In single precision a little is left of 0.
-            yield (
-                name,
-                title,
-                units.say(units.rounded(found, power, record["spacing"]), power, unit),
-            )
+            yield title, units.say(units.rounded(found, power, record["spacing"]), power, unit)

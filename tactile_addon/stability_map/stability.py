@@ -5,6 +5,7 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from statistics import median
+from time import perf_counter
 from typing import Any
 
 import bpy
@@ -22,11 +23,10 @@ from ..touch.units import length
 
 EXTENT_SHARE = 1.0 / 8.0  # This share of the object's size stands for an extent that touches choose.
 SPACING_SHARE = 1.0 / 4.0  # The default spacing, as a share of the extent.
+TRIED_SPACING = 1.0 / 4.0  # Touches that are timed are so far apart, as a share of the object's size.
 BATCH = 20  # The number of touches that are fitted at once, in some hundredths of a second.
 GROWING_BATCH = 4  # Touches that choose their extent are fewer, because their fits have more contacts.
-MOST_COUNTED = 5000  # More points are not chosen just to be counted, which would take seconds.
 NEAREST_AT_ONCE = 10_000  # The number of vertices that get their nearest touch at once.
-EQUAL = 1e-3  # Areas that differ by a smaller share are equal but for rounding.
 NOTHING = -1.0  # Each quantity has this value where there is no patch.
 # The values of the attribute `reason`: key, name, and the stop of a curve that it follows from.
 REASONS = [
@@ -47,28 +47,36 @@ def expected_count(obj: Object, depsgraph: bpy.types.Depsgraph, extent: float, s
     Raises ValueError, with a sentence, for an object that cannot be touched.
     """
     evaluated, linear, _ = evaluated_object(obj, depsgraph)
-    faces, extent = evaluated.data.polygons, extent or EXTENT_SHARE * size_of(evaluated, linear)
-    spacing = spacing or SPACING_SHARE * extent
-    area = float(read_array(faces, "area").sum()) * abs(np.linalg.det(linear)) ** (2.0 / 3.0)
-    count = min(len(faces), core.spaced_count(area, spacing))
-    if count > MOST_COUNTED:
-        return count
-    # Long or narrow faces have their middles where others leave no room, as on a letter.
-    middles: Array = read_array(faces, "center", 3) @ linear.T
-    return sum(index is not None for index in core.spaced(middles, spacing, np.random.default_rng(0)))
+    spacing = spacing or SPACING_SHARE * (extent or EXTENT_SHARE * size_of(evaluated, linear))
+    area = float(read_array(evaluated.data.polygons, "area").sum())
+    return core.spaced_count(area * abs(np.linalg.det(linear)) ** (2.0 / 3.0), spacing)
+
+
+def seconds_each(obj: Object, depsgraph: bpy.types.Depsgraph, arguments: Mapping[str, Any]) -> float:
+    """About how many seconds a touch of an object takes, by one batch of touches far apart.
+
+    Raises ValueError, with a sentence, for an object that cannot be touched.
+    """
+    tried = StabilityMap(obj, depsgraph, spacing=TRIED_SPACING * max(obj.dimensions), **arguments)
+    for _ in tried.steps():
+        if tried.done:
+            return (perf_counter() - tried.began) / tried.done
+    return 0.0
 
 
 class StabilityMap:
-    """Touches of an evaluated mesh in the middle of faces that are spaced evenly.
+    """Touches of an evaluated mesh at places that are spaced evenly, however large its faces are.
 
-    At its vertices a coarse mesh has creases, and most clicks are elsewhere.
+    They are in the middle of triangles, which are cut until none is longer than the spacing: at vertices a
+    coarse mesh has creases, and most clicks are elsewhere.
 
     places : n arrays (3,), the places to touch as the surface has them, in random order
     done : how many of these have been touched; few_facets : how many patches follow facets
     measures, reason : (n,), what was found by each touch; the fields of `measures` are MEASURES
-    areas : those of the faces
-    touch_in : index of the touch nearest to the middle of each face, once the steps are done
-    touch_of : that of the largest face at each vertex, or the nearest to a vertex without faces
+    points, triangles, owners : (k, 3), (m, 3) and (m,), the mesh that is painted, and its triangles' faces
+    areas : those of the triangles
+    touch_in : index of the touch nearest to the middle of each triangle, once the steps are done
+    touch_of : that of the largest triangle at each vertex, or the nearest to a vertex without faces
     """
 
     def __init__(
@@ -111,7 +119,10 @@ class StabilityMap:
 
     def steps(self) -> Iterator[None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
-        self._middles, self.areas = _faces(self.surface)
+        self.points, self.triangles, self.owners = _cut(self.surface, self.spacing)
+        corners = self.points[self.triangles]
+        self._middles = corners.mean(axis=1)
+        self.areas = 0.5 * np.linalg.norm(triangle_cross(corners), axis=1)
         yield
         for index in core.spaced(self._middles, self.spacing, self._rng):
             if index is not None:
@@ -122,6 +133,7 @@ class StabilityMap:
         self.reason = np.full(count, REASON_KEYS.index("nothing"), dtype=np.int32)
         batch = BATCH if self.extent else GROWING_BATCH
         size = batch if self.fit["method"] == "bayes" else 1
+        self.began = perf_counter()
         for start in range(0, count, size):
             end = min(start + size, count)
             yield from self._touch(range(start, end))
@@ -139,11 +151,11 @@ class StabilityMap:
             self.touch_in[some] = tree.query(self._middles[some])[1]
             yield
         # Touches in narrow faces would color wide ones that share all vertices with them, as on a plate.
-        owners, self.touch_of = self.surface.owners, np.full(len(self.surface.points), -1)
-        order = np.argsort(self.areas[owners], kind="stable")
-        self.touch_of[self.surface.triangles[order].ravel()] = np.repeat(self.touch_in[owners[order]], 3)
+        self.touch_of = np.full(len(self.points), -1)
+        order = np.argsort(self.areas, kind="stable")
+        self.touch_of[self.triangles[order].ravel()] = np.repeat(self.touch_in[order], 3)
         loose = self.touch_of < 0
-        self.touch_of[loose] = tree.query(self.surface.points[loose])[1]
+        self.touch_of[loose] = tree.query(self.points[loose])[1]
 
     def _touch(self, numbers: Sequence[int]) -> Iterator[None]:
         """Makes the touches with these numbers, as a generator like `steps`."""
@@ -210,6 +222,7 @@ class StabilityMap:
             "in_doubt": counts.pop("doubt"),
             "few_facets": self.few_facets,
             "refused": counts,
+            "object_size": self.surface.size,
         }
         for name in MEASURES:
             values = self.measures[name][: self.done]
@@ -229,17 +242,27 @@ def _reason_of(stops: Iterable[str]) -> int:
     return STOP_CODES[counts.most_common(1)[0][0] if counts else core.CREASE]
 
 
-def _faces(surface: DetachedMesh) -> tuple[Array, Array]:
-    """The middle of the largest triangle of each face, (m, 3), and the areas of faces, (m,).
+def _cut(surface: DetachedMesh, longest: float) -> tuple[Array, Array, Array]:
+    """Points (n, 3), triangles (m, 3) and their faces (m,) of a mesh, cut until no edge is longer than that.
 
-    The middle is within a face even if that is concave. Of equal triangles, as in a quad, it is the first.
+    Triangles are halved at the middle of their longest edge. A neighbor may not be, which leaves no gap, as
+    triangles are flat.
     """
-    corners, owners = surface.points[surface.triangles], surface.owners
-    areas = 0.5 * np.linalg.norm(triangle_cross(corners), axis=1)
-    most = np.maximum.reduceat(areas, np.flatnonzero(np.diff(owners, prepend=-1)))
-    large = np.flatnonzero(areas >= (1.0 - EQUAL) * most[owners])
-    first = large[np.diff(owners[large], prepend=-1) != 0]
-    return corners[first].mean(axis=1), np.bincount(owners, areas)
+    points, triangles, owners = surface.points, surface.triangles, surface.owners
+    while True:
+        corners = points[triangles]
+        sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+        large = sides.max(axis=1) > longest
+        if not large.any():
+            return points, triangles, owners
+        first = sides[large].argmax(axis=1)[:, None]
+        a, b, c = np.take_along_axis(triangles[large], (first + np.arange(3)) % 3, axis=1).T
+        ends, number = np.unique(np.sort(np.column_stack([a, b]), axis=1), axis=0, return_inverse=True)
+        middle = len(points) + number.ravel()
+        points = np.vstack([points, points[ends].mean(axis=1)])
+        halves = [triangles[~large], np.column_stack([a, middle, c]), np.column_stack([middle, b, c])]
+        triangles = np.vstack(halves).astype(np.int32)
+        owners = np.concatenate([owners[~large], owners[large], owners[large]])
 
 
 class _Plane:

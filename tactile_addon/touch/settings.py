@@ -53,13 +53,13 @@ _is_silent = False  # Whether settings change within `silent`.
 
 @contextmanager
 def silent() -> Iterator[None]:
-    """Within this context, no handler looks at settings that change: the caller does it."""
+    """Within this context, no handler looks at what changes: the caller touches again."""
     global _is_silent
-    _is_silent = True
+    outer, _is_silent = _is_silent, True
     try:
         yield
     finally:
-        _is_silent = False
+        _is_silent = outer
 
 
 def is_silent() -> bool:
@@ -215,21 +215,11 @@ def touch_arguments(settings: Any) -> dict[str, Any]:
 
 
 def draw_chosen(
-    layout: bpy.types.UILayout,
-    settings: Any,
-    name: str,
-    found: Mapping[str, str] | None = None,
-    fields: Mapping[str, str] | None = None,
+    layout: bpy.types.UILayout, settings: Any, name: str, found: Mapping[str, str] | None = None
 ) -> None:
-    """Draws a number that the surface chooses if it is 0, which the label says with the value it has `found`.
-
-    fields : by the name of a length, the property that shows it, with the value that was found
-    """
-    shown = (fields or {}).get(name, name)
+    """Draws a number that the surface chooses if it is 0; its label has the value that was `found`."""
     if getattr(settings, name):
-        layout.prop(settings, shown)
-    elif shown != name:  # Its value is the one that was found.
-        layout.prop(settings, shown, text=AUTO[name])
+        layout.prop(settings, name)
     elif found and found.get(name):
         row = layout.row()
         row.use_property_split = False  # The label takes the width it needs.
@@ -238,39 +228,29 @@ def draw_chosen(
         layout.prop(settings, name, text=AUTO[name])
 
 
-def draw_sensor(
-    layout: bpy.types.UILayout,
-    settings: Any,
-    found: Mapping[str, str] | None = None,
-    fields: Mapping[str, str] | None = None,
-) -> None:
-    """Draws the rows of step and noise; `found` and `fields` as in draw_chosen."""
-    draw_chosen(layout, settings, "step", found, fields)
-    layout.prop(settings, (fields or {}).get("noise", "noise"))
+def draw_noise(layout: bpy.types.UILayout, settings: Any) -> None:
+    """Draws the rows of the noise of the simulated sensor."""
+    layout.prop(settings, "noise")
     if settings.noise:
         layout.prop(settings, "seed")
 
 
-def draw_solver(
-    layout: bpy.types.UILayout,
-    settings: Any,
-    found: Mapping[str, str] | None = None,
-    fields: Mapping[str, str] | None = None,
-) -> None:
-    """Draws the rows of the method and of its options; `found` and `fields` as in draw_chosen."""
+def draw_fit(layout: bpy.types.UILayout, settings: Any, found: Mapping[str, str] | None = None) -> None:
+    """Draws the rows of the method and of its options; `found` as in draw_chosen."""
     layout.prop(settings, "method")
-    draw_chosen(layout, settings, "degree", found, fields)
+    draw_chosen(layout, settings, "degree", found)
     if settings.method in ("tagc", "quadratic-variation"):
         layout.prop(settings, "weight")
 
 
-def draw_all(layout: bpy.types.UILayout, settings: Any, fields: Mapping[str, str] | None = None) -> None:
-    """Draws all settings, as Adjust Last Operation has them; `fields` as in draw_chosen."""
-    draw_chosen(layout, settings, "extent", fields=fields)
+def draw_all(layout: bpy.types.UILayout, settings: Any) -> None:
+    """Draws all settings, as Adjust Last Operation has them."""
+    draw_chosen(layout, settings, "extent")
     layout.prop(settings, "plane_count")
     for i in range(settings.plane_count):
         column = layout.column(align=True)
         column.prop(settings, "azimuths", index=i, text=f"Azimuth {i + 1}")
         column.prop(settings, "tilts", index=i, text="Tilt")
-    draw_sensor(layout, settings, fields=fields)
-    draw_solver(layout, settings)
+    draw_chosen(layout, settings, "step")
+    draw_noise(layout, settings)
+    draw_fit(layout, settings)

@@ -110,9 +110,7 @@ class TouchReport(TypedDict, total=False):
     vertex_distance_max: float
     suggested_plane: SuggestedPlane
     patch: str  # The name of the patch object.
-    contours: str  # The name of the object of its contours.
-    own_limit: float  # Where the colors would end by its own values,
-    color_limit: float  # and where they end.
+    color_limit: float  # Where the colors end.
     registration: Registration
     verification: dict[str, Any]  # The name of the mesh as `target`, and what core.verify has found.
 

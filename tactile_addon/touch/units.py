@@ -20,7 +20,6 @@ METERS = dict(zip((*ADAPTIVE["METRIC"], *ADAPTIVE["IMPERIAL"]), core.UNIT_METERS
 # In an adaptive unit lengths are at least 1 or this, because few count micrometers or thous.
 LEAST = {"MILLIMETERS": 1e-2, "INCHES": 1e-2}
 LEAST_SHOWN, SHOWN = 1e-4, 5e-2  # A length below the first is in a unit in which it is at least the second.
-LEAST_NUMBER = 10.0  # The unit of a whole object suits this many tolerances.
 ZERO = 1e-6  # A number below this, in units of the radius or the size, counts as 0.
 SUPERSCRIPTS = {1: "", 2: "²"}
 
@@ -43,15 +42,8 @@ def unit_of(scene: bpy.types.Scene, size: float) -> Unit:
 
 
 def unit_of_report(scene: bpy.types.Scene, report: Mapping[str, Any]) -> Unit:
-    """The unit of all numbers of a patch or of a whole object; the latter has lengths far below its radii."""
-    if "tolerance" not in report:
-        return unit_of(scene, report["radius"])
-    return unit_of(scene, LEAST_NUMBER * (report["tolerance"] or report["height_std"]))
-
-
-def unit_of_colors(scene: bpy.types.Scene, report: Mapping[str, Any], power: int) -> Unit:
-    """The unit of what a patch or whole object shows, in length^power; curvatures suit patches."""
-    return unit_of(scene, report["radius"]) if power < 0 else unit_of_report(scene, report)
+    """The unit of all numbers of a patch, a map or a whole object, which is one for all of one object."""
+    return unit_of(scene, report.get("object_size") or report.get("size") or report["radius"])
 
 
 def say(value: float, power: int, unit: Unit, std: float | None = None) -> str:
@@ -89,6 +81,16 @@ def length(value: float, unit: Unit | None = None) -> str:
     """A length in words for a message, in this unit or in that of the open scene."""
     size = abs(value) if 0.0 < abs(value) < math.inf else 1.0
     return say(value, 1, unit or unit_of(bpy.context.scene, size))
+
+
+def duration(seconds: float) -> str:
+    """About how long something takes, in words."""
+    return f"{rough(max(seconds, 1.0))} s" if seconds < 60.0 else f"{rough(seconds / 60.0)} min"
+
+
+def rough(number: float) -> int:
+    """A number with one significant digit, as an estimate has it."""
+    return int(float(f"{number:.0e}"))
 
 
 def symbol(power: int, unit: Unit) -> str:

@@ -12,7 +12,7 @@ from ... import core
 from ...core.arguments import many
 from .settings import METHODS
 from .touch_report import Registration, SuggestedPlane, TouchReport
-from .units import Unit, known, length, rounded, say, unit_of
+from .units import Unit, known, length, rounded, say, unit_of_report
 
 SPREAD = ("mean", "median", "max", "rms")
 FORMULAS = ("=", "+", "-", "@", "\t", "\r", "\n")  # Spreadsheets run text that begins with one of these.
@@ -21,7 +21,7 @@ ROUNDING = 1e-6  # A component below this share of the largest is what single pr
 
 def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
     """(label, value) of everything there is to say of a patch, with lengths in the unit of scene or file."""
-    seconds, unit = report["seconds"], unit_of(bpy.context.scene, report["radius"])
+    seconds, unit = report["seconds"], unit_of_report(bpy.context.scene, report)
     contacts = _measured_contacts(report) if "curves" in report else _tracked(report)
     return [
         ("touched", report["source"]),
@@ -132,7 +132,7 @@ def sentence(error: Exception) -> str:
 
 def fit_summary(report: TouchReport) -> str:
     """A sentence on a fit: the verdict on it, and the curvatures."""
-    unit = unit_of(bpy.context.scene, report["radius"])
+    unit = unit_of_report(bpy.context.scene, report)
     return f"{verdict(report, unit)}. Curvatures {curvatures(report, unit)}"
 
 

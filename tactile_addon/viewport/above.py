@@ -16,14 +16,13 @@ import gpu
 import numpy as np
 
 from ..scene.mesh_data import ABOVE
-from ..scene.patch_record import ATLAS_RECORD, MAP_RECORD, parts_of, report_of
+from ..scene.patch_record import ATLAS_RECORD, MAP_RECORD, report_of
 from ..touch.arrays import read_array
 from ..touch.types import Array, Object
 
 DARKEST, BRIGHTEST = 0.3, 0.7  # The share of its color that a face has edge on, and upright, as in Solid.
 TOWARD = 0.015  # A patch is drawn nearer by this share of its distance than what is below it.
 ALIKE = 0.1  # Patches overlap only if the cosine between their normals is more.
-CONTOUR_COLOR = np.array([[0.0, 0.0, 0.0, 1.0]], dtype=np.float32)
 # The place on the screen stays, and only the depth is that of a nearer point.
 VERTEX = """
 void main() {
@@ -48,14 +47,9 @@ def draw_above() -> None:
     if space.shading.type != "SOLID" or space.shading.color_type != "VERTEX" or context.mode != "OBJECT":
         return
     objects: Sequence[Object] = list(context.visible_objects)
-    visible = {obj for obj in objects if obj.type == "MESH" and len(obj.data.polygons)}
+    visible = {obj for obj in objects if obj.type == "MESH" and obj.data.color_attributes.active_color}
     in_mesh = [obj for obj in visible if _is_of_object(obj) and not obj.show_in_front]
-    layers = {
-        part: layer
-        for obj, layer in _layers([obj for obj in visible if obj.show_in_front]).items()
-        for part in parts_of(obj)
-        if part in visible
-    }
+    layers = _layers([obj for obj in visible if obj.show_in_front])
     for uid in set(_batches) - {obj.session_uid for obj in (*in_mesh, *layers)}:
         del _batches[uid]
     gpu.state.depth_test_set("LESS_EQUAL")
@@ -105,19 +99,14 @@ def _draw(obj: Object, height: float, layer: int) -> None:
 def _batch(obj: Object, height: float) -> gpu.types.GPUBatch:
     """The triangles of an object, made anew if it shows something else."""
     mesh, color = obj.data, obj.data.color_attributes.active_color
-    colors = CONTOUR_COLOR if color is None else read_array(color.data, "color", 4)
+    colors = read_array(color.data, "color", 4)
     points = read_array(mesh.vertices, "co", 3)
     key = hash(points.tobytes()), hash(colors.tobytes()), height
     known = _batches.get(obj.session_uid)
     if known is None or known[0] != key:
-        if color is None or color.domain == "CORNER":
-            corners = colors
-        else:
-            corners = colors[read_array(mesh.loops, "vertex_index", dtype=np.int32)]
-        _batches[obj.session_uid] = (
-            key,
-            _new_batch(mesh, points, np.broadcast_to(corners, (len(mesh.loops), 4)), height),
-        )
+        if color.domain == "POINT":
+            colors = colors[read_array(mesh.loops, "vertex_index", dtype=np.int32)]
+        _batches[obj.session_uid] = key, _new_batch(mesh, points, colors, height)
     return _batches[obj.session_uid][1]
 
 

@@ -20,7 +20,7 @@ from .mouse import draw_hints, mouse_ray
 
 DRAG_TURN, DRAG_TILT, DRAG_EXTENT, POINT = "TURN", "TILT", "EXTENT", "POINT"
 # If the sine of the angle between view and plane is less, nothing can be dragged in the plane, or not well.
-EDGE_ON, STEEP = 0.03, 0.15
+EDGE_ON, STEEP = 0.03, 0.5
 SNAP = math.radians(5.0)  # With Ctrl, angles change by this step.
 PRECISE = 0.1  # With Shift, this share of the mouse's way counts.
 TIPS = {
@@ -199,7 +199,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
 
 
 def shown_probe(context: bpy.types.Context) -> Object | None:
-    """The probe whose handles are shown: the active one, or that of the active patch or contours; or None."""
+    """The probe whose handles are shown: the active one, or that of the active patch; or None."""
     found = probe.probe_of(context.object)
     if found is None or not found.visible_get() or probe.lock_of(found) is not None:
         return None

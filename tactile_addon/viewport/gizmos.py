@@ -6,19 +6,20 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import bpy
+import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Matrix, Vector
 
 from ..probes import probe
+from ..scene.curves import CURVES
 from ..touch.touch_object import plane_axes
+from .curves import PLANE_COLORS
 from .drag import DRAG_EXTENT, DRAG_TILT, DRAG_TURN, POINT, STEEP, shown_probe
 from .free_view import is_free
-from .overlay import PLANE_COLORS
 
-HANDLE_REACH = 1.15  # Handles that turn planes are this many extents away from the point,
-UPRIGHT = 0.75  # and those that tilt planes this many extents above it,
-# or at the first of these multiples where the view is free: at the other end, or nearer.
-ENDS = [sign * share / 10.0 for share in range(10, 1, -1) for sign in (1.0, -1.0)]
+# Handles that turn planes are on the ends of their curves, and those that tilt planes this many extents above
+# the point, or at the first place where the view is free: at the other end, or nearer.
+UPRIGHT, UPRIGHT_PLACES = 0.75, 10
 MARGIN = 10.0  # It is free where this many pixels at scale 1 around a handle are.
 BALL, LEAST_BALL = 0.12, 0.05  # Sizes of balls, in units of Blender's gizmo size.
 SHARE = 0.125  # A ball is no larger than this share of the patch in the view.
@@ -47,7 +48,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         self.point.select_bias = NEAREST
         self.turns = [self._ball(DRAG_TURN, i, color) for i, color in enumerate(PLANE_COLORS)]
         self.tilts = [self._ball(DRAG_TILT, i, color) for i, color in enumerate(PLANE_COLORS)]
-        self.ends = dict.fromkeys((*self.turns, *self.tilts), 1.0)
+        self.ends = dict.fromkeys((*self.turns, *self.tilts), 0)
 
     def _ball(self, what: str, plane: int, color: Sequence[float]) -> Any:
         ball = self._handle("GIZMO_GT_move_3d", what, plane, color)
@@ -76,37 +77,39 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         active = min(settings.active_plane, settings.plane_count - 1)
         self.point.matrix_basis = Matrix.Translation(center)
         self.point.hide = settings.target is None
-        planes = [plane_axes(matrix, settings, i).T.tolist() for i in range(settings.plane_count)]
-        arms = [(self.turns[i], HANDLE_REACH * reach * Vector(t)) for i, (t, _, _) in enumerate(planes)]
-        t, up = (Vector(axis) for axis in planes[active][:2])
+        patch = probe.patch_of(obj)
+        paths = [np.reshape(path, (-1, 3)) for path in patch[CURVES]["contours"]]
+        lines = [[patch.matrix_world @ Vector(p) for p in path] for path in paths]
+        handles = list(zip(self.turns[: settings.plane_count], lines, strict=False))
+        t, up = (Vector(axis) for axis in plane_axes(matrix, settings, active).T.tolist()[:2])
         # If the tilt's plane is seen edge on, a little way of the mouse turns it by much.
         if abs(_line_of_sight(context.region_data, center).dot(t)) >= STEEP:
-            arms.append((self.tilts[active], UPRIGHT * reach * up))
+            shares = np.linspace(-UPRIGHT, UPRIGHT, 2 * UPRIGHT_PLACES).tolist()
+            handles.append((self.tilts[active], [center + share * reach * up for share in shares]))
         for each in (*self.turns, *self.tilts):
             each.hide = True
         taken: list[Any] = []
-        for each, arm in arms:
-            self._put(context, each, center, arm, taken)
+        for each, line in handles:
+            self._put(context, each, line, taken)
             each.hide = not apart(each.matrix_basis.translation)
         self.extent.hide = not apart(center + reach * _right(context))
         self.extent.matrix_basis = Matrix.LocRotScale(center, matrix.to_quaternion(), [reach] * 3)
 
-    def _put(
-        self, context: bpy.types.Context, handle: Any, center: Vector, arm: Vector, taken: list[Any]
-    ) -> None:
-        """Puts a handle at the first end where the view is free, or if there is none, at the first one.
+    def _put(self, context: bpy.types.Context, handle: Any, line: list[Any], taken: list[Any]) -> None:
+        """Puts a handle on a line, as far out as the view is free, or if it is nowhere, on its end.
 
         taken : where the handles are that were put before, in the region; this one is added
         """
+        places = [place for pair in zip(reversed(line), line, strict=True) for place in pair][: len(line)]
         margin = MARGIN * context.preferences.system.ui_scale
 
-        def is_good(end: float) -> bool:
-            at = _seen(context, center + end * arm)
+        def is_good(end: int) -> bool:
+            at = _seen(context, places[end])
             return is_free(context, at, margin) and all((at - other).length > 2.0 * margin for other in taken)
 
         if not handle.is_modal:  # One that is dragged stays at its end.
-            self.ends[handle] = next(filter(is_good, ENDS), ENDS[0])
-        place: Any = center + self.ends[handle] * arm
+            self.ends[handle] = next(filter(is_good, range(len(places))), 0)
+        place = places[min(self.ends[handle], len(places) - 1)]
         handle.matrix_basis = Matrix.Translation(place)
         taken += filter(None, [_seen(context, place)])
 

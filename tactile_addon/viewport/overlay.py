@@ -15,39 +15,23 @@ from gpu_extras.batch import batch_for_shader
 from ..probes import probe
 from ..scene import colors, patch_record
 from ..scene.attributes import REASON
-from ..scene.contour_mesh import rim
 from ..scene.viewports import shows_colors
 from ..stability_map import map_object
 from ..touch import units
-from ..touch.touch_object import Touched, plane_axes
-from ..touch.types import Array, Object
+from ..touch.touch_object import plane_axes
+from ..touch.types import Object
 from ..touch.units import Unit
 from .above import draw_above
+from .curves import FONT, PLANE_COLORS, WHITE, draw_curves, draw_letters, draw_preview
 from .drag import DRAG_TILT, DRAG_TURN
 from .free_view import free_strip
 from .mouse import is_over
 
-# Each sampling plane has one of Okabe and Ito's colors, which color-blind readers can tell apart.
-PLANE_COLORS = [
-    (0.90, 0.62, 0.0), (0.34, 0.71, 0.91), (0.0, 0.62, 0.45),
-    (0.94, 0.89, 0.26), (0.80, 0.47, 0.65), (0.84, 0.37, 0.0),
-]  # fmt: skip
-WHITE, DARK = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.6)
-FONT = 0  # This is Blender's own font.
 TEXT = 11.0  # The font's size in panels.
 LEGEND_STEPS = 65  # The number of colors of the legend's bar.
 LETTERS, OFFSET = 48, 16  # The letters in a line of words near the mouse, and the pixels between them.
 BAR = (150, 12)  # Width and height of the legend's bar, in pixels at resolution scale 1,
 BESIDE = 195  # and the width that it needs beside the last operator's panel.
-
-
-def preview_lines(touched: Touched) -> list[tuple[Array, tuple[float, ...]]]:
-    """(points, color) of each line of a pick's preview: the rim of the patch, the normal and the contours."""
-    r = touched.result
-    normal = np.array([r.frame.origin, r.frame.origin + 0.6 * r.radius * r.frame.axes[:, 2]])
-    pairs = zip(r.contours, PLANE_COLORS, strict=False)
-    curves = [(contour.points, (*color, 1.0)) for contour, color in pairs]
-    return [(r.frame.to_world(rim(r)), WHITE), (normal, WHITE), *curves]
 
 
 def draw_key(seen: dict[str, Any]) -> None:
@@ -89,26 +73,6 @@ def _begin_box(context: bpy.types.Context) -> tuple[float, float, float, Sequenc
     red, green, blue = theme.text
     blf.color(FONT, red, green, blue, 1.0)
     return scale, 6.0 * scale, blf.dimensions(FONT, "0")[1], theme.inner[:3]
-
-
-def draw_preview(seen: dict[str, Any]) -> None:
-    """Draws the preview of seen["touched"], a touch or None."""
-    if seen["touched"] is None:
-        return
-    scale = bpy.context.preferences.system.ui_scale
-    gpu.state.blend_set("ALPHA")
-    for points, color in preview_lines(seen["touched"]):
-        _line(points, DARK, 4.5 * scale)
-        _line(points, color, 2.0 * scale)
-    gpu.state.blend_set("NONE")
-
-
-def _line(points: Array, color: Sequence[float], width: float) -> None:
-    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
-    shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
-    shader.uniform_float("lineWidth", width)
-    shader.uniform_float("color", color)
-    batch_for_shader(shader, "LINE_STRIP", {"pos": points.tolist()}).draw(shader)
 
 
 def _active(context: bpy.types.Context) -> Object | None:
@@ -156,12 +120,12 @@ def draw_legend() -> None:
         low = 0.0 if shown in patch_record.POSITIVE else -1.0
         title = patch.bl_rna.properties["tactile_colors"].enum_items[shown].name
         power = patch_record.POWERS[shown]
-        bar = _scale(title, record, units.unit_of_colors(context.scene, record, power), power, low)
+        bar = _scale(title, record, units.unit_of_report(context.scene, record), power, low)
         _draw_box(context, *bar, [("Unknown", colors.UNKNOWN)] if record.get("is_gray") else ())
     elif obj is not None and patch_record.MAP_RECORD in obj and obj.visible_get():
         record, shown = obj[patch_record.MAP_RECORD], obj.tactile_map_colors
         title = obj.bl_rna.properties["tactile_map_colors"].enum_items[shown].name
-        unit = units.unit_of(context.scene, record["spacing"])
+        unit = units.unit_of_report(context.scene, record)
         bar = _scale(title, record, unit, map_object.MAP_POWERS[shown], 0.0)
         if shown == REASON:
             bar = title, 0.0, []
@@ -262,7 +226,13 @@ def _fill(points: Sequence[Sequence[float]], shades: Sequence[Sequence[float]]) 
 # Functions that draw and when they do so: those that are always there, and those of a pick. The latter get a
 # dict with the keys touched, the touch whose preview is drawn, or None; refusal, a sentence on why there is
 # none, or None; and mouse, where the mouse is in the window.
-DRAWINGS = ((draw_above, "POST_VIEW"), (draw_plane, "POST_VIEW"), (draw_legend, "POST_PIXEL"))
+DRAWINGS = (
+    (draw_above, "POST_VIEW"),
+    (draw_curves, "POST_VIEW"),
+    (draw_plane, "POST_VIEW"),
+    (draw_letters, "POST_PIXEL"),
+    (draw_legend, "POST_PIXEL"),
+)
 PICK_DRAWINGS = ((draw_preview, "POST_VIEW"), (draw_key, "POST_PIXEL"))
 
 

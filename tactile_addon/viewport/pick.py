@@ -26,6 +26,7 @@ from ..touch.settings import (
     PlacedTouch,
     draw_all,
     given,
+    silent,
     touch_arguments,
 )
 from ..touch.touch_object import Touched, touch
@@ -126,7 +127,7 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         touched = self._seen["touched"]
         self.target, self.location = touched.report["source"], touched.result.point
         self.outward = touched.result.frame.axes[:, 2]
-        return self.execute(context)
+        return self._make(context, touched)
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Removes everything that shows that a pick is going on."""
@@ -138,39 +139,39 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         _redraw(context)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
-        depsgraph = context.evaluated_depsgraph_get()
         try:
-            moved = self._inherit(context)
-            target = target_object(context, self.target)
-            touched = self._touch(context, target, depsgraph)
+            self._inherit(context)
+            touched = touch(
+                target_object(context, self.target),
+                context.evaluated_depsgraph_get(),
+                given(self, "location") or context.scene.cursor.location.to_tuple(),
+                toward=given(self, "outward"),
+                **touch_arguments(self),
+            )
         except ValueError as error:
             return report_error(self, error)
+        return self._make(context, touched)
+
+    def _make(self, context: bpy.types.Context, touched: Touched) -> Outcome:
+        """Gives the probe to be moved, or a new one, the patch of a touch."""
+        depsgraph, moved = context.evaluated_depsgraph_get(), self._moved(context)
+        target = bpy.data.objects[touched.report["source"]]
         found = moved or probe.make(context, target)
         settings = found.tactile_probe
         with_target = anchor.is_attached(found) if moved else self.parent
-        settings.is_probe = False  # The changes below must not make it touch again each time.
-        settings.target = target
-        if with_target and found.parent != target:
-            anchor.attach(found, target)
-        for name in NAMES:
-            setattr(settings, name, getattr(self, name))
-        touch_again.adopt(found, touched, depsgraph, complete=True)
-        settings.is_probe = True
+        with silent():
+            settings.target, settings.is_probe = target, True
+            if with_target and found.parent != target:
+                anchor.attach(found, target)
+            for name in NAMES:
+                setattr(settings, name, getattr(self, name))
+            touch_again.adopt(found, touched, depsgraph, complete=True)
         make_active(context, found)
         show_colors(context.space_data)
         show_size(touched.surface.size)
         report = probe.record_of(found)
-        unit = units.unit_of(context.scene, report["radius"])
+        unit = units.unit_of_report(context.scene, report)
         return report_done(self, verdict(report, unit), report["status"] == "ok")
-
-    def _touch(self, context: bpy.types.Context, target: Object, depsgraph: bpy.types.Depsgraph) -> Touched:
-        return touch(
-            target,
-            depsgraph,
-            given(self, "location") or context.scene.cursor.location.to_tuple(),
-            toward=given(self, "outward"),
-            **touch_arguments(self),
-        )
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
@@ -180,13 +181,17 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         layout.prop(self, "parent")
         draw_all(layout, self)
 
-    def _inherit(self, context: bpy.types.Context) -> Object | None:
-        """The probe to be moved, or None. Settings that are not set are taken from it or from the active map.
+    def _moved(self, context: bpy.types.Context) -> Object | None:
+        """The probe to be moved, or None if a new one is to be made."""
+        return None if self.new else probe.probe_of(context.view_layer.objects.active)
+
+    def _inherit(self, context: bpy.types.Context) -> None:
+        """Takes settings that are not set from the probe to be moved or from the active map.
 
         Raises ValueError if the probe cannot be changed.
         """
         active: Object = context.view_layer.objects.active
-        moved, inputs = None if self.new else probe.probe_of(active), {}
+        moved, inputs = self._moved(context), {}
         if moved is not None:
             probe.require_unlocked(moved)
             inputs = {name: getattr(moved.tactile_probe, name) for name in NAMES}
@@ -195,7 +200,6 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         for name, value in inputs.items():
             if not self.properties.is_property_set(name):
                 setattr(self, name, value)
-        return moved
 
     def _hover(self, context: bpy.types.Context, event: bpy.types.Event) -> str:
         """Touches below the mouse for the preview, and returns what there is to say of it.
@@ -211,11 +215,11 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
                 obj, location, eye = found
                 active = context.view_layer.objects.active
                 if (patch_record.touched_record(active) or {}).get("source") == obj.name:
-                    location = touched_near(active, obj, location)
+                    location = touched_near(active, location)
                 depsgraph = context.evaluated_depsgraph_get()
                 touched = touch(obj, depsgraph, location, toward=eye, **touch_arguments(self))
                 self._seen["touched"] = touched
-                unit = units.unit_of(context.scene, touched.result.radius)
+                unit = units.unit_of_report(context.scene, touched.report)
                 is_sure = touched.report["status"] == "ok"
                 bends = f"principal curvatures {curvatures(touched.report, unit)}"
                 words = short = f"{obj.name}: {bends if is_sure else verdict(touched.report, unit)}"

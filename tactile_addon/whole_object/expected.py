@@ -47,8 +47,8 @@ class Expected:
             tolerance = tolerance or tolerance_of(self._mesh.size, accuracy, noise)
             touches, seconds = expected(self._mesh, tolerance, noise)
             self._given = given
-            about = f"{many(touches, 'touch', 'touches')}, {_time(seconds)}"
-            unit = units.unit_of_report(context.scene, {"tolerance": tolerance})  # as the panel has
+            about = f"{many(touches, 'touch', 'touches')}, {units.duration(seconds)}"
+            unit = units.unit_of_report(context.scene, {"size": self._mesh.size})  # as the panel has
             self._words = f"Tolerance {units.length(tolerance, unit)}: about {about}"
         return self._words
 
@@ -63,18 +63,9 @@ def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, f
     touches, tried = core.expected_touches(mesh, *places, area, tolerance=tolerance, noise=noise, rng=SEED)
     each = (perf_counter() - begin) / tried
     meshing = MESHING * fineness(core.thinnest_wall(mesh, *places, mesh.size) / mesh.size)
-    return _rounded(touches), (meshing + JOINING * touches) * each
+    return units.rough(touches), (meshing + JOINING * touches) * each
 
 
 def fineness(wall: float) -> float:
     """How many times as many triangles a surface has if its thinnest wall has this share of the size."""
     return float(np.clip(1.0 / wall, THIN, THINNEST) / THIN) ** 2
-
-
-def _rounded(number: float) -> int:
-    """A number with one significant digit, as an estimate has it."""
-    return int(float(f"{number:.0e}"))
-
-
-def _time(seconds: float) -> str:
-    return f"{_rounded(max(seconds, 1.0))} s" if seconds < 60.0 else f"{_rounded(seconds / 60.0)} min"

@@ -9,7 +9,6 @@ from bpy.props import EnumProperty, FloatVectorProperty, IntProperty
 
 from ..probes import probe
 from ..probes.in_slices import AllOver, Progress
-from ..probes.number_fields import dragged
 from ..probes.operators import (
     has_target,
     is_in_object_mode,
@@ -37,7 +36,6 @@ ACCURACIES = [
 ]
 
 
-@dragged
 class TACTILE_OT_touch_all_over(AllOver, bpy.types.Operator):
     """Touch an object all over, from one point on, and join the patches to one surface"""
 
@@ -150,12 +148,13 @@ class TACTILE_OT_touch_all_over(AllOver, bpy.types.Operator):
         return self._expected.words(target, context, self.tolerance, self.accuracy, self.noise)
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout, fields = self.layout, self._draw_target(context)
+        self._draw_target(context)
+        layout = self.layout
         row = layout.row()
         row.active = not self.tolerance
         row.prop(self, "accuracy", expand=True)
-        draw_chosen(layout, self, "tolerance", fields=fields)
-        draw_chosen(layout, self, "edge", fields=fields)
+        draw_chosen(layout, self, "tolerance")
+        draw_chosen(layout, self, "edge")
         layout.prop(self, "most")
-        layout.prop(self, fields["noise"])
+        layout.prop(self, "noise")
         layout.prop(self, "seed")

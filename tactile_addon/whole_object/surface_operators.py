@@ -9,7 +9,6 @@ import numpy as np
 from mathutils import Vector
 
 from ..probes.in_slices import InSlices, Progress
-from ..probes.number_fields import dragged, fields
 from ..probes.operators import is_in_object_mode, make_active, polls, report_done, report_error, surface_of
 from ..scene import patch_record
 from ..scene.attributes import DEVIATION
@@ -22,12 +21,12 @@ from . import kept, whole_mesh
 from .object_operator import EDGE
 from .object_report import deviation, object_summary
 
-SEEN = 0.4  # The view is as wide as this share of the object's size.
+SEEN = 1.0  # The place is seen from so many sizes of the object, so that what is around it is seen, too.
 REACHED = 0.5  # A surface with less than this share of the largest deviation does not reach the object there.
 
 
 class TACTILE_OT_look_farthest(bpy.types.Operator):
-    """Look where surface and mesh are farthest apart, and show deviations. The 3D cursor marks the place"""
+    """Look where surface and mesh are farthest apart, in the middle of the view, and show deviations"""
 
     bl_idname = "tactile.look_farthest"
     bl_label = "Look at Largest Deviation"
@@ -54,7 +53,6 @@ class TACTILE_OT_look_farthest(bpy.types.Operator):
         is_reached = there >= REACHED * largest or largest <= record["edge"]
         make_active(context, obj)
         place, turn = obj.matrix_world @ place, obj.matrix_world.to_quaternion()
-        context.scene.cursor.location = place
         view = context.region_data
         if view is not None:
             view.view_perspective = "ORTHO" if view.view_perspective == "ORTHO" else "PERSP"
@@ -79,7 +77,6 @@ def _select_nearest(mesh: bpy.types.Mesh, place: Point) -> Any:
     return mesh.vertices[nearest]
 
 
-@dragged
 class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
     """Make the surface again with edges of another length, from the same touches"""
 
@@ -138,9 +135,7 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
-        draw_chosen(
-            layout, self, "edge", fields=fields(surface_of(context)[patch_record.ATLAS_RECORD]["size"])
-        )
+        draw_chosen(layout, self, "edge")
 
 
 CLASSES = (TACTILE_OT_look_farthest, TACTILE_OT_mesh_again)

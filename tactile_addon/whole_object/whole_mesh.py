@@ -15,7 +15,7 @@ from ... import core
 from ..scene import colors, patch_object, patch_record, undo
 from ..scene.attributes import COLOR, CORNERS, DEVIATION, HEIGHT_STD, NODE
 from ..scene.mesh_data import ABOVE, emission, fill, own_mesh, write
-from ..scene.shown import LEAST_BEND, least_gaussian_range, recolor
+from ..scene.shown import bend_range, recolor
 from ..scene.viewports import show_colors, show_size
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Array, Object
@@ -46,7 +46,8 @@ class GrowingPatches:
         with undo.after_step():  # There is an undo step when the operator ends.
             undo.note_added(obj)
         obj.data.materials.append(emission("Tactile Surface", attribute=COLOR))
-        self._patches: list[tuple[Array, Array, Array, Array]] = []
+        self._patches: list[tuple[Array, Array]] = []
+        self._bends: list[tuple[float, float]] = []  # The larger principal curvature of each, and its area.
         self._uid, self._size, self._surface = obj.session_uid, surface.size, surface
         self._placed = np.zeros((0, 8))  # The origin, normal, reach and height of each patch.
         show_colors()
@@ -58,16 +59,15 @@ class GrowingPatches:
         if obj is None or not found:
             return
         for r, rim in zip(found, rims, strict=True):
-            points, normals, k, curvedness = _disk(r, rim)
+            points, normals, mean_curvature = _disk(r, rim)
             layer = min(LAYER * self._size, OWN_LAYER * float(np.median(rim)))
             above = _below(self._surface, points, normals) + self._height(r.frame, rim.max(), layer)
-            areas = np.full(len(k), np.mean(rim**2))
-            self._patches.append((points + above[:, None] * normals, k, curvedness, areas))
-        points, k, curvedness, areas = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
+            self._patches.append((points + above[:, None] * normals, mean_curvature))
+            self._bends.append((max(abs(r.k1), abs(r.k2)), np.mean(rim**2)))
+        points, mean_curvatures = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
         count = 1 + SPOKES * len(RINGS)
         triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
-        floor = least_gaussian_range(curvedness, LEAST_BEND / self._size**2)
-        shades = colors.diverging(k, colors.range_by_area(k, areas, floor))
+        shades = colors.diverging(mean_curvatures, bend_range(*np.transpose(self._bends), self._size))
         shades.reshape(-1, count, 4)[:, -SPOKES:] = RIM_COLOR
         fill(obj.data, points, triangles, [(COLOR, shades)])
 
@@ -92,17 +92,17 @@ class GrowingPatches:
         return next((obj for obj in bpy.data.objects if obj.session_uid == self._uid), None)
 
 
-def _disk(r: core.Reconstruction, rim: Array) -> tuple[Array, Array, Array, Array]:
-    """Points (n, 3) of a patch, on rings around its middle, normals, Gaussian curvatures and curvedness (n,).
+def _disk(r: core.Reconstruction, rim: Array) -> tuple[Array, Array, Array]:
+    """Points (n, 3) of a patch, on rings around its middle, normals, and mean curvatures (n,).
 
     rim : (k SPOKES,), the radii of the patch all round, where the finger felt it end
     """
     angles = np.linspace(0.0, 2.0 * np.pi, SPOKES, endpoint=False)
     edge = rim[:: len(rim) // SPOKES, None] * np.column_stack([np.cos(angles), np.sin(angles)])
     x, y = np.vstack([np.zeros((1, 2)), *(share * edge for share in RINGS)]).T
-    d, patch = r.geometry.derivatives(x, y), r.patch
+    d = r.geometry.derivatives(x, y)
     points = r.frame.to_world(np.column_stack([x, y, d.z]))
-    return points, d.normal @ r.frame.axes.T, patch.gaussian_curvature(x, y), patch.curvedness(x, y)
+    return points, d.normal @ r.frame.axes.T, r.patch.mean_curvature(x, y)
 
 
 def _below(surface: DetachedMesh, points: Array, normals: Array) -> Array:

@@ -16,7 +16,6 @@ FOLDER = Path(os.environ["GUI_SHOT"]).parent
 PICK_BUTTON, ASIDE = (893, 128), (300, 640)
 VIEWPORT = "1052x692+0+28"  # the viewport in that window
 MOST_BYTES = 300_000  # the size of a picture of the docs at most
-ARROW = 1.15  # extents from the point to the handles
 
 
 def check(what, good, detail=""):
@@ -131,9 +130,12 @@ def extent(owner):
     return owner.tactile_probe.extent or patch(owner)["tactile"]["extent"]
 
 
-def handle(azimuth, reach=ARROW):
-    """Where the handle of a plane at that azimuth is in the window."""
+def handle(azimuth, reach=1.0):
+    """Where in the window the handle of a plane at that azimuth is, or else a place so many extents away."""
     obj = probe()
+    for path, other in zip(patch()["tactile_curves"]["contours"], obj.tactile_probe.azimuths, strict=False):
+        if reach == 1.0 and abs(other - azimuth) < 1e-5:
+            return gui.view_point(patch().matrix_world @ Vector(path[-3:]))
     e1, e2 = obj.matrix_world.col[0].xyz, obj.matrix_world.col[1].xyz
     at = math.cos(azimuth) * e1 + math.sin(azimuth) * e2
     return gui.view_point(obj.matrix_world.translation + reach * extent(obj) * at)

@@ -237,18 +237,11 @@ def move_and_delete_patch():
     check(
         "G on the patch leaves it where it was touched", off < 1e-5 * max(1.0, place.translation.length), off
     )
-    yield from drag_object(patch().children[0], "g")
-    off = (patch().children[0].matrix_world.translation - place.translation).length
-    check("... and so it does the contours", off < 1e-5 * max(1.0, place.translation.length), off)
     select(patch())
     press("x", "Return")
-    yield from until(lambda: len(bpy.data.objects) == count - 2, 10)
-    left = [
-        name
-        for name in (*bpy.data.objects.keys(), *bpy.data.meshes.keys())
-        if "Cont" in name or "Patch" in name
-    ]
-    check("X on the patch takes the contours along, and their meshes", not left, left)
+    yield from until(lambda: len(bpy.data.objects) == count - 1, 10)
+    left = [o.name for o in bpy.data.objects if "Patch" in o.name]
+    check("X on the patch takes it away", not left, left)
     bpy.context.view_layer.objects.active = probe()
     yield 1
     said = probe().tactile_probe.message
@@ -256,20 +249,20 @@ def move_and_delete_patch():
     picture("patch_deleted")
     press("ctrl+z")
     yield from until(lambda: patch() is not None and not probe().tactile_probe.message)
-    good = patch() is not None and patch().children and not probe().tactile_probe.message
-    check("Ctrl Z brings patch and contours again", good, bpy.data.objects.keys())
+    good = patch() is not None and not probe().tactile_probe.message
+    check("Ctrl Z brings the patch again", good, bpy.data.objects.keys())
     press("ctrl+shift+z")
-    yield from until(lambda: patch() is None and len(bpy.data.objects) == count - 2, 10)
+    yield from until(lambda: patch() is None and len(bpy.data.objects) == count - 1, 10)
     probe().tactile_probe.azimuths[0] += 0.1
     bpy.ops.ed.undo_push(message="Turn")
     yield from until(is_complete)
-    names = sorted(o.name for o in bpy.data.objects if "Cont" in o.name or "Patch" in o.name)
-    check("the next touch makes them anew", names == [f"{TARGET} Contours", f"{TARGET} Patch"], names)
+    names = [o.name for o in bpy.data.objects if "Patch" in o.name]
+    check("the next touch makes it anew", len(names) == 1, names)
 
 
 def handles():
     axes = probe().matrix_world
-    for obj in (patch(), patch().children[0]):
+    for obj in (patch(), probe()):
         select(obj)
         look(axes.translation, axes.col[2].xyz + 0.3 * axes.col[1].xyz, 6.0 * extent(probe()))
         yield 1

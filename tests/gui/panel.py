@@ -17,8 +17,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from common import PICK_BUTTON, check, is_complete, last_report, look, open_tab, patch, picture, probe, until
 
 # Places in a window of 1280 by 800 with the sidebar open.
-NUMBER, SENSOR = (790, 524), (815, 321)
-CONTOURS, HANDLES, MAP_PROBE = (825, 477), (950, 477), (893, 284)
+NUMBER, SENSOR = (790, 420), (840, 321)
+CONTOURS, HANDLES, MAP_PROBE = (813, 493), (972, 493), (893, 284)
 
 
 def probes():
@@ -120,17 +120,17 @@ def toggled(place, reached):
 
 
 def hidden():
-    (lines,), settings = patch().children, probe().tactile_probe
-    yield from toggled(CONTOURS, lambda: lines.hide_viewport)
-    check("a button hides the contours", lines.hide_viewport and not lines.visible_get())
+    settings = probe().tactile_probe
+    yield from toggled(CONTOURS, lambda: not patch().tactile_contours)
+    check("a button hides the contours", not patch().tactile_contours)
     yield from toggled(HANDLES, lambda: not settings.show_handles)
     check("... and one the handles", not settings.show_handles)
     picture("panel_hidden")
     settings.azimuths[0] += 0.01
     yield from until(is_complete)
-    yield from toggled(CONTOURS, lambda: not lines.hide_viewport)
+    yield from toggled(CONTOURS, lambda: patch().tactile_contours)
     yield from toggled(HANDLES, lambda: settings.show_handles)
-    check("... and they come back", lines.visible_get() and settings.show_handles)
+    check("... and they come back", patch().tactile_contours and settings.show_handles)
 
 
 def on_map():

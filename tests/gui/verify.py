@@ -111,8 +111,7 @@ def press_button(name, **inputs):
 
 def large():
     """A sheet of a million faces with a patch over a good part of it, verified and put onto it again."""
-    for obj in (*patch().children, patch()):
-        bpy.data.objects.remove(obj)
+    bpy.data.objects.remove(patch())
     bpy.data.objects["Suzanne"].hide_set(True)
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=1000, y_subdivisions=1000, size=2.0, location=(0, 0, 0))
     sheet = bpy.context.object

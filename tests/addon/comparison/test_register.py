@@ -50,7 +50,7 @@ def forehead(obj, bpy):
 
 
 @pytest.mark.long
-def test_a_lost_patch_comes_back_with_its_contours(empty, suzanne):
+def test_a_lost_patch_comes_back(empty, suzanne):
     patch = touched(empty, suzanne, forehead(suzanne, empty))
     truth = lost(empty, patch)
     before = [tuple(vertex.co) for vertex in suzanne.data.vertices]
@@ -58,8 +58,6 @@ def test_a_lost_patch_comes_back_with_its_contours(empty, suzanne):
     empty.context.view_layer.update()
     distance, angle = apart(patch.matrix_world, truth)
     assert (distance < 0.02 * RADIUS, angle < 2.0) == (True, True), (distance, angle)
-    (lines,) = patch.children
-    assert apart(lines.matrix_world, truth)[0] < 0.02 * RADIUS
     found = patch["tactile"]["registration"].to_dict()
     assert found["residuals"] == sorted(found["residuals"])
     assert found["residuals"][0] < 0.01 * RADIUS
@@ -135,9 +133,7 @@ def imported(bpy, suzanne, tmp_path):
     patch = touched(bpy, suzanne, forehead(suzanne, bpy))
     path = tmp_path / "felt.csv"
     assert bpy.ops.tactile.export_contacts(filepath=str(path)) == {"FINISHED"}
-    lines = patch.children[0]
-    for obj in (lines, patch):
-        bpy.data.objects.remove(obj)
+    bpy.data.objects.remove(patch)
     assert bpy.ops.tactile.import_contacts(filepath=str(path)) == {"FINISHED"}
     found = bpy.context.object
     lost(bpy, found)

@@ -59,9 +59,7 @@ def test_contacts_become_a_patch(empty, measured):
     assert len(report["misses"]) == 3
     assert max(report["misses"]) < 0.05
     assert list(patch.matrix_world.translation) == pytest.approx(report["frame"]["origin"], abs=1e-5)
-    (lines,) = patch.children
-    assert len(set(values(lines.data, "contact"))) == 25
-    assert np.isfinite(positions(lines.data)).all()
+    assert [len(path) for path in patch["tactile_curves"]["contours"]] == [3 * 24] * 3
 
 
 @pytest.mark.parametrize("normals", [True, False], ids=["by normals", "by the bulge"])
@@ -134,9 +132,8 @@ def test_strokes_without_contours_become_a_patch_around_a_place(extension, empty
     assert np.linalg.norm(np.cross(off, report["frame"]["normal"])) < 0.01
     assert report["frame"]["normal"] == pytest.approx(SURFACE.normal, abs=0.03)
     assert "misses" not in report
-    (lines,) = patch.children
-    assert set(values(lines.data, "contour")) == {-1}
-    assert len(set(values(lines.data, "contact")) - {-1}) == report["contacts"]
+    (strokes,) = patch["tactile_curves"]["strokes"]
+    assert (len(patch["tactile_curves"]["contours"]), len(strokes)) == (0, 3 * report["contacts"])
     _, near = imported(empty, path, radius=6.0, **options)
     assert near["radius"] < 6.0 < report["radius"]
     r = extension.reconstruction_of(patch)
@@ -179,12 +176,8 @@ def test_strokes_that_carry_no_patch_are_refused_with_a_sentence(extension, empt
 def test_contacts_in_any_order_are_drawn_along_their_curve(empty, measured):
     patch, report = imported(empty, measured(normals=False, shuffle=True))
     assert [report["k1"], report["k2"]] == pytest.approx([SURFACE.k1, SURFACE.k2], abs=2e-3)
-    mesh = patch.children[0].data
-    curve, contact = (values(mesh, name) for name in ("contour", "contact"))
-    points = positions(mesh)
-    for number in range(3):
-        centers = points[(curve == number) & (contact >= 0)].reshape(-1, 6, 3).mean(axis=1)
-        steps = np.linalg.norm(np.diff(centers, axis=0), axis=1)
+    for path in patch["tactile_curves"]["contours"]:
+        steps = np.linalg.norm(np.diff(np.reshape(path, (-1, 3)), axis=0), axis=1)
         assert steps.max() < 2.3  # it is 2 across the reference point, which is no contact
 
 
@@ -329,12 +322,10 @@ def test_nothing_goes_out_without_a_patch(empty, measured, tmp_path):
 
 
 def test_what_is_shown_is_not_what_is_kept(extension, empty, measured, tmp_path):
-    """Edits of the contours or the patch do not change what is exported; a move of the patch moves it."""
+    """Edits of the patch do not change what is exported; a move of the patch moves it."""
     patch, report = imported(empty, measured())
     before = extension.reconstruction_of(patch)
-    for mesh in (patch.data, patch.children[0].data):
-        mesh.vertices[7].co.z += 5.0
-    empty.data.objects.remove(patch.children[0])
+    patch.data.vertices[7].co.z += 5.0
     assert empty.ops.tactile.export_patch(filepath=str(tmp_path / "out.json")) == {"FINISHED"}
     r = from_dict(json.loads((tmp_path / "out.json").read_text()))
     assert np.array_equal(r.contacts, before.contacts)
@@ -346,7 +337,7 @@ def test_what_is_shown_is_not_what_is_kept(extension, empty, measured, tmp_path)
     assert moved.frame.origin == pytest.approx(np.add(r.frame.origin, (0.25, 0.0, 0.0)), abs=1e-5)
     assert moved.contacts == pytest.approx(2.0 * r.contacts, rel=1e-5, abs=1e-5)
     assert moved.patch.k1 == pytest.approx(0.5 * r.patch.k1, rel=1e-5)
-    with pytest.raises(ValueError, match="Wanted a patch, its probe or its contours"):
+    with pytest.raises(ValueError, match="Wanted a patch or its probe"):
         extension.reconstruction_of(None)
 
 

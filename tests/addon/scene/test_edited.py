@@ -98,7 +98,7 @@ def test_what_was_converted_is_no_patch_and_the_probe_makes_a_new_one(empty, ext
         obj.select_set(False)
     patch.select_set(True)
     empty.ops.object.convert(target="CURVE")
-    with pytest.raises(ValueError, match="Wanted a patch, its probe or its contours"):
+    with pytest.raises(ValueError, match="Wanted a patch or its probe"):
         extension.reconstruction_of(patch)
     probe.location = (0.4, -0.2, 1.9)
     empty.context.view_layer.update()

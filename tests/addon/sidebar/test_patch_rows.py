@@ -88,10 +88,10 @@ def test_the_reasons_say_what_limits_a_good_patch(wording, empty):
 
 
 def test_the_deviation_at_the_rim_stands_below_the_mean(said, ball):
-    rows = dict(said.main_rows(ball[1], UNIT))
+    rows = dict(said.other_rows(ball[1], UNIT))
     mean, rim = (float(rows[key].split()[1]) for key in ("Height", "At the Rim"))
     assert 1.5 < rim / mean < 10.0
-    assert dict(said.main_rows({**ball[1], "height_std_rim": 0.04}, UNIT))["At the Rim"] == "± 0.04 mm"
+    assert dict(said.other_rows({**ball[1], "height_std_rim": 0.04}, UNIT))["At the Rim"] == "± 0.04 mm"
 
 
 @pytest.mark.parametrize("status", ["uncertain", "not_converged"])
@@ -109,60 +109,6 @@ def test_the_verdict_says_what_to_do_where_there_is_doubt(wording, status):
 
 def test_the_verdict_on_an_earlier_patch_is_none(wording):
     assert wording.verdict(record("outdated"), UNIT) == "Outdated: touch again"
-
-
-@pytest.mark.parametrize(
-    "scale, unit", [(1.0, "METERS"), (1.0, "ADAPTIVE"), (0.001, "MILLIMETERS"), (0.01, "NONE")]
-)
-@pytest.mark.parametrize("meters", [0.0065, 0.065, 0.1, 2.0, 65.0])
-def test_a_number_is_dragged_by_the_size_of_the_object(empty, extension, meters, scale, unit):
-    """The pace is only near that size: Blender has none between a micrometer and a millimeter a pixel."""
-    settings = empty.context.scene.unit_settings
-    settings.scale_length = scale
-    if unit == "NONE":
-        settings.system = "NONE"
-    else:
-        settings.length_unit = unit
-    number_fields, size = extension.tactile_addon.probes.number_fields, meters / scale
-    for name, shown in number_fields.fields(size).items():
-        decade = int(shown.rpartition("_by_")[2].replace("m", "-"))
-        pace = number_fields.pace_of(decade) / (number_fields.PACES[name] * size)
-        assert 1.0 / 40.0 < pace < 40.0, (name, pace)
-
-
-def test_without_units_a_short_length_has_digits_enough(empty, extension):
-    empty.context.scene.unit_settings.system = "NONE"
-    number_fields = extension.tactile_addon.probes.number_fields
-    group = empty.types.Object.bl_rna.properties["tactile_probe"].fixed_type
-    for size, least in ((2e-3, 5), (2.0, 2)):
-        assert group.properties[number_fields.fields(size)["extent"]].precision == least
-
-
-def test_a_number_that_is_left_to_the_surface_shows_what_it_has(empty, extension):
-    size = 0.065
-    empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=0.5 * size)
-    empty.ops.tactile.pick(location=(0.0, 0.0, 0.5 * size))
-    settings = empty.context.object.tactile_probe
-    fields = extension.tactile_addon.probes.number_fields.fields(max(settings.target.dimensions))
-    (patch,) = empty.context.object.children
-    assert getattr(settings, fields["extent"]) == pytest.approx(patch["tactile"]["extent"])  # as it was found
-    assert settings.extent == getattr(settings, fields["noise"]) == 0.0
-    setattr(settings, fields["extent"], 0.2 * size)
-    assert settings.extent == pytest.approx(0.2 * size)
-    assert patch["tactile"]["extent"] == pytest.approx(0.2 * size)
-
-
-def test_a_length_that_is_dragged_in_a_dialog_is_the_operators_own(empty, extension):
-    empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=2.0)
-    name = extension.tactile_addon.probes.number_fields.fields(4.0)["extent"]
-    assert empty.ops.tactile.stability_map(**{name: 0.9, "spacing": 0.8}) == {"FINISHED"}
-    assert empty.context.object["tactile_map"]["extent"] == pytest.approx(0.9)
-
-
-@pytest.mark.parametrize("operator", ["pick", "reconstruct", "add_planes"])
-def test_what_blender_logs_has_no_properties_except_the_inputs(empty, operator):
-    kind = getattr(empty.ops.tactile, operator).get_rna_type()
-    assert not [name for name in kind.properties.keys() if "_by_" in name]  # noqa: SIM118
 
 
 def test_what_was_found_stands_next_to_auto(said, empty, ball):
@@ -233,15 +179,17 @@ def test_panels_have_the_scene_s_unit_unless_numbers_in_it_would_be_long(extensi
     units, scene = extension.tactile_addon.touch.units, empty.context.scene
     assert scene.unit_settings.length_unit == "METERS"
     assert [units.unit_of(scene, size)[0] for size in (5.0, 0.05, 0.012, 0.005)] == ["m", "cm", "cm", "mm"]
-    record = {"radius": 0.01, "tolerance": 2e-4, "height_std": 1e-5, "color_limit": 4800.0}
-    assert extension.tactile_addon.whole_object.object_report.unit_of(record)[0] == "mm"
+    record = {"radius": 0.01, "size": 0.05, "tolerance": 2e-4, "height_std": 1e-5, "color_limit": 48.0}
+    assert extension.tactile_addon.whole_object.object_report.unit_of(record)[0] == "cm"
     empty.ops.mesh.primitive_cube_add()
     empty.context.object["tactile_object"] = record
-    ranges = extension.tactile_addon.scene.color_range
-    assert ranges.unit_of_range(empty.context.object, scene)[1][0] == "cm"  # as of a patch of that size
+    for shown in ("mean_curvature", "deviation"):  # One object has one unit, whatever is shown.
+        empty.context.object.tactile_colors = shown
+        assert extension.tactile_addon.scene.shown.unit_of_range(empty.context.object, scene)[1][0] == "cm"
+    record["color_limit"] = 48.0
+    empty.context.object["tactile_object"] = record
+    empty.context.object.tactile_colors = "mean_curvature"
     assert empty.context.object.tactile_range == pytest.approx(0.48)
-    empty.context.object.tactile_colors = "deviation"
-    assert ranges.unit_of_range(empty.context.object, scene)[1][0] == "mm"  # as the numbers below it
 
 
 class Layout:
@@ -316,7 +264,7 @@ def test_what_a_registration_has_found_stays_in_the_panel(extension, empty):
     assert '"Suzanne" (root mean square)' in words
 
 
-def test_the_numbers_of_an_earlier_touch_are_gray_below_a_title(extension, empty, ball):
+def test_the_numbers_of_an_earlier_touch_are_gray(extension, empty, ball):
     probe, _ = ball
     assert empty.ops.tactile.verify() == {"FINISHED"}
     probe.tactile_probe.live = False
@@ -325,12 +273,9 @@ def test_the_numbers_of_an_earlier_touch_are_gray_below_a_title(extension, empty
         return drawn_of(empty, extension, probe)
 
     numbers = ("κ1", "κ2", "Height", "Curvedness", "Overlap")
-    assert "Last Touch" not in dict(drawn())
     assert all(dict(drawn())[name] for name in numbers[:4])
     probe.tactile_probe.extent = 0.2
     empty.context.view_layer.update()
-    texts = [text for text, _ in drawn()]
-    assert texts.index("Last Touch") < texts.index("κ1")
     assert not any(dict(drawn())[name] for name in numbers)
 
 
@@ -348,7 +293,45 @@ def test_a_single_thing_is_not_said_in_the_plural(extension, empty):
     measured |= {"tolerance": None, "radius": 1.0}
     assert "1 patch of 1 contact;" in addon.whole_object.object_report.object_summary(measured)
     made = addon.stability_map.map_report.map_table_rows(
-        {"source": "Cube", "touched": 1, "points": 1, "patches": 1, "in_doubt": 0, "refused": {}}
-        | {"method": "bayes", "degree": "auto", "spacing": 1.0, "extent": 1.0, "step": 0.1}
+        {
+            "source": "Cube",
+            "touched": 1,
+            "points": 1,
+            "patches": 1,
+            "in_doubt": 0,
+            "refused": {},
+            "object_size": 2,
+        }
+        | {
+            "method": "bayes",
+            "degree": "auto",
+            "spacing": 1.0,
+            "extent": 1.0,
+            "step": 0.1,
+            "object_size": 2.0,
+        }
     )
     assert dict(made)["touched"] == "Cube, at 1 of 1 point"
+
+
+def test_the_list_of_probes_leads_to_each(extension, empty):
+    empty.ops.mesh.primitive_cylinder_add(vertices=64)
+    for place in ((0.2, 0.1, 1.0), (0.0, -1.0, 0.1)):
+        assert empty.ops.tactile.pick(target="Cylinder", location=place, new=True) == {"FINISHED"}
+    context = SimpleNamespace(
+        scene=empty.context.scene,
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+        region=SimpleNamespace(width=300),
+        view_layer=empty.context.view_layer,
+    )
+    layout = Layout()
+    panel = extension.tactile_addon.sidebar.panel.TACTILE_PT_probes
+    panel.draw_active(None, context, layout, empty.context.object)
+    texts = [text for text, _ in layout.drawn if "κ1" in text]
+    assert [text.split("   ")[0] for text in texts] == ["Cylinder Probe", "Cylinder Probe.001"]
+    assert "κ1 0 ± " in texts[0]
+    assert "κ1 -" in texts[1]
+    assert empty.ops.tactile.activate(name="Cylinder Probe") == {"FINISHED"}
+    assert empty.context.object.name == "Cylinder Probe"
+    with pytest.raises(RuntimeError, match='There is no probe "Nothing" in this view layer'):
+        empty.ops.tactile.activate(name="Nothing")

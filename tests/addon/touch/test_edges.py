@@ -197,15 +197,18 @@ def test_the_preview_promises_no_more_than_was_felt(empty, extension, cube):
     planes = [addon.touch.touch_object.core.SamplingPlane(math.radians(azimuth)) for azimuth in (0, 60, 120)]
     inputs = {"extent": 0.5, "step": 0.0, "noise": 0.0, "seed": 0, "method": "bayes", "degree": "auto"}
     touched = addon.touch.touch_object.touch(cube, depsgraph, (0.9, 0.2, 1.0), planes, **inputs)
-    (rim, _), (normal, _), *curves = addon.viewport.overlay.preview_lines(touched)
-    assert len(curves) == 3
+    curves = {
+        name: [touched.result.frame.to_world(np.reshape(path, (-1, 3))) for path in paths]
+        for name, paths in addon.scene.curves.curves_of(touched.result).items()
+    }
+    (rim,), lines = curves["rim"], curves["contours"]
+    assert len(lines) == 3
     assert np.array_equal(rim[0], rim[-1])
-    ends = np.vstack([points[[0, -1]] for points, _ in curves])
+    ends = np.vstack([points[[0, -1]] for points in lines])
     assert np.abs(rim[:, 2] - 1.0).max() < 1e-3
     assert rim[:, 0].max() < 1.02  # the edge is at 1; a disk of that extent would reach to 1.4
     for end in ends:  # the rim runs through what was felt last
         assert np.linalg.norm(rim - end, axis=1).min() < 0.03
-    assert normal[1] - normal[0] == pytest.approx([0.0, 0.0, 0.6 * touched.result.radius], abs=1e-6)
 
 
 # Places close together on a torus whose smooth shape has kappa1 = -4 there.

@@ -1,0 +1,130 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The curves of patches and of a pick's preview: contours in the colors of their planes, rims, directions."""
+
+from collections.abc import Sequence
+from itertools import cycle
+from typing import Any, cast
+
+import blf
+import bpy
+import gpu
+import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from gpu_extras.batch import batch_for_shader
+from mathutils import Matrix, Vector
+
+from ... import core
+from ..scene.curves import CURVES, Curves, curves_of
+from ..scene.mesh_data import ABOVE
+from ..touch.types import Array, Object
+
+# Each sampling plane has one of Okabe and Ito's colors, which color-blind readers can tell apart.
+PLANE_COLORS = [
+    (0.90, 0.62, 0.0), (0.34, 0.71, 0.91), (0.0, 0.62, 0.45),
+    (0.94, 0.89, 0.26), (0.80, 0.47, 0.65), (0.84, 0.37, 0.0),
+]  # fmt: skip
+WHITE, BLACK, DARK = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.6)
+WIDTH, OUTLINE = 1.5, 0.75  # Of a curve, and of the dark line on either side of it, in pixels at scale 1.
+STROKE = 3.0  # The size of a contact of a stroke.
+NEARER = 0.998  # Where curves may be hidden, they are drawn at this share of their distance.
+FONT, LETTER = 0, 12.0  # Blender's own font; the size of the letters of principal directions.
+
+
+def draw_curves() -> None:
+    """Draws the curves of all visible patches on them; in Solid shading through what is in front of them."""
+    context = bpy.context
+    space: Any = context.space_data
+    is_solid = space.shading.type in ("SOLID", "WIREFRAME")
+    shown = _shown_patches(context)
+    if not shown:
+        return
+    gpu.state.depth_test_set("NONE" if is_solid else "LESS_EQUAL")
+    gpu.state.depth_mask_set(False)  # A curve would hide parts of its own outline.
+    for obj in shown:
+        pushed = cast(Any, gpu.matrix.push_pop())  # which the stubs make no context
+        lift = Matrix.Translation((0.0, 0.0, 0.0 if is_solid else obj.get(ABOVE, 0.0)))
+        with pushed:
+            gpu.matrix.load_matrix(_nearer(context.region_data) @ gpu.matrix.get_model_view_matrix())
+            gpu.matrix.multiply_matrix(obj.matrix_world @ lift)
+            draw(obj[CURVES], obj.tactile_contours, obj.tactile_directions)
+    gpu.state.depth_test_set("NONE")
+
+
+def _shown_patches(context: bpy.types.Context) -> list[Object]:
+    """The visible patches whose curves or directions are shown."""
+    space: Any = context.space_data
+    objects: Sequence[Object] = context.visible_objects if space.overlay.show_overlays else ()
+    return [o for o in objects if CURVES in o and (o.tactile_contours or o.tactile_directions)]
+
+
+def _nearer(view: bpy.types.RegionView3D) -> Matrix:
+    """What moves all a little toward the eye, to the same place on the screen."""
+    if view.is_perspective:
+        return Matrix.Scale(NEARER, 4)
+    return Matrix.Translation((0.0, 0.0, (1.0 - NEARER) * view.view_distance))
+
+
+def draw(curves: Curves, has_contours: bool = True, has_directions: bool = False) -> None:
+    """Draws Curves in the coordinates of their patch."""
+    scale = bpy.context.preferences.system.ui_scale
+    lines: list[tuple[Sequence[float], Sequence[float]]] = []
+    if has_contours:
+        lines = [(path, WHITE) for path in curves["rim"]]
+        pairs = zip(curves["contours"], cycle(PLANE_COLORS), strict=False)
+        lines += [(path, (*color, 1.0)) for path, color in pairs]
+    if has_directions:
+        lines += [(path, BLACK) for path in curves["directions"]]
+    gpu.state.blend_set("ALPHA")
+    for path, color in lines:
+        points = np.reshape(path, (-1, 3))
+        draw_line(points, DARK, (WIDTH + 2.0 * OUTLINE) * scale)
+        draw_line(points, color, WIDTH * scale)
+    for path in curves.get("strokes", ()) if has_contours else ():
+        _draw_points(np.reshape(path, (-1, 3)), STROKE * scale)
+    gpu.state.blend_set("NONE")
+
+
+def draw_line(points: Array, color: Sequence[float], width: float) -> None:
+    """Draws a line through points (n, 3), so many pixels wide."""
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
+    shader.uniform_float("lineWidth", width)
+    shader.uniform_float("color", color)
+    batch_for_shader(shader, "LINE_STRIP", {"pos": points.tolist()}).draw(shader)
+
+
+def _draw_points(points: Array, size: float) -> None:
+    shader = gpu.shader.from_builtin("POINT_UNIFORM_COLOR")
+    shader.uniform_float("color", BLACK)
+    gpu.state.point_size_set(size)
+    batch_for_shader(shader, "POINTS", {"pos": points.tolist()}).draw(shader)
+
+
+def draw_letters() -> None:
+    """Writes which principal curvature is that along a direction, at its end."""
+    context = bpy.context
+    scale = context.preferences.system.ui_scale
+    for obj in _shown_patches(context):
+        for path, text in zip(obj[CURVES]["directions"], ("κ1", "κ2"), strict=True):
+            end = obj.matrix_world @ Vector(path[-3:])
+            at = location_3d_to_region_2d(context.region, context.region_data, end)
+            if obj.tactile_directions and at is not None:
+                blf.size(FONT, LETTER * scale)
+                blf.color(FONT, *WHITE)
+                blf.position(FONT, at.x + 4.0 * scale, at.y, 0.0)
+                blf.draw(FONT, text)
+
+
+def draw_preview(seen: dict[str, Any]) -> None:
+    """Draws the curves and the normal of seen["touched"], a touch or None."""
+    if seen["touched"] is None:
+        return
+    r: core.Reconstruction = seen["touched"].result
+    frame = np.eye(4)
+    frame[:3, :3], frame[:3, 3] = r.frame.axes, r.frame.origin
+    pushed = cast(Any, gpu.matrix.push_pop())
+    with pushed:
+        gpu.matrix.multiply_matrix(Matrix(frame.tolist()))
+        draw(curves_of(r))
+        draw_line(np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 0.6 * r.radius)]), WHITE, WIDTH)
