@@ -47,6 +47,7 @@ from .reconstruction.options import METHODS
 from .reconstruction.result import Reconstruction
 from .reconstruction.serialization import from_dict, to_dict
 from .reconstruction.status import CONTRADICTING, DOUBTFUL_STD
+from .scan.face_orientation import DOUBLED, INWARD, orientation_fault
 from .scan.facets import has_few_facets, is_beside_bend
 from .scan.pose_search import Pose, register
 from .scan.sampling import scattered, spaced, spaced_count
@@ -56,8 +57,10 @@ __version__ = "0.1.0"  # That of blender_manifest.toml; python -m tools.release 
 __all__ = [
     "CONTRADICTING",
     "CREASE",
+    "DOUBLED",
     "DOUBTFUL_STD",
     "EXTENT",
+    "INWARD",
     "METHODS",
     "NOT_MONGE",
     "NO_CONTACT",
@@ -106,6 +109,7 @@ __all__ = [
     "judged_by_mesh",
     "mean_height_stds",
     "mesh_error",
+    "orientation_fault",
     "overlapped",
     "reachable",
     "reconstruct",

@@ -14,6 +14,7 @@ from mathutils.bvhtree import BVHTree
 
 from .arrays import read_array
 from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, require_in_scene
+from .oriented import require_oriented
 from .types import Array, Object, Point, Triple
 
 PAUSE = 50.0  # The time until the shape is compared again, as a multiple of the time that this takes.
@@ -40,6 +41,7 @@ class DetachedMesh(PlacedMesh):
         """Raises ValueError, with a sentence, if `obj` cannot be touched."""
         evaluated, linear, _ = evaluated_object(obj, depsgraph)
         co = coordinates(evaluated)
+        require_oriented(evaluated, co)
         # It keeps no reference to the object, which somebody may delete.
         self.name, self._uid = obj.name, obj.session_uid
         self._checksum, self.matrix = zlib.crc32(co.data), obj.matrix_world.copy()
