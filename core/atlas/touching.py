@@ -186,11 +186,11 @@ class _Run:
         """Takes in touches that were found before, unless they are less certain than is asked for now."""
         frame, step = earlier[0].result.frame, earlier[0].step
         self.frontier = self._frontier(vector_of(frame.origin), vector_of(frame.axes[:, 2]), step)
+        self.done = len(earlier)
         for e in earlier:
             is_sure = e.result.mean_height_std <= SIZE * self.tolerance
             if is_sure and self.frontier.add(e.result, NARROW * self.tolerance, SMALL * self.tolerance):
                 self.found.append(e)
-                self.done += 1
                 yield from self.show(self.now(new=[e]))
 
     def _places(self, point: Vector, up: Vector) -> Iterator[tuple[Vector, Vector]]:

@@ -37,7 +37,11 @@ from ..touch.wording import registration_summary, verdict
 from ..viewport.pick import TACTILE_OT_pick
 from ..whole_object.object_operator import TACTILE_OT_touch_all_over
 from ..whole_object.object_report import deviation, facets, is_all_within, object_rows, object_verdict
-from ..whole_object.surface_operators import TACTILE_OT_look_farthest, TACTILE_OT_mesh_again
+from ..whole_object.surface_operators import (
+    TACTILE_OT_continue_touching,
+    TACTILE_OT_look_farthest,
+    TACTILE_OT_mesh_again,
+)
 from .dots import dot
 from .patch_rows import found_values, main_rows, other_rows, plane_rows
 from .rows import draw_rows, draw_sentence
@@ -197,6 +201,8 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         if words := facets(record):
             draw_sentence(context, layout, words, "ERROR")
             layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
+        if record.get("uncovered"):
+            layout.operator(TACTILE_OT_continue_touching.bl_idname, icon="PLAY")
         _draw_colors(context, layout, obj, "tactile_colors")
         if patch_record.is_colored(obj):
             _draw_range(context, layout, obj)

@@ -45,7 +45,7 @@ TIPS = {
     "Patch to Mesh": "Largest distance of a vertex of the patch from the mesh, as the colors show it",
     "Touches": "Number of touches that the object took",
     "Surface": "Closed: felt all round; Open: the object ends there; Incomplete: touches could go on",
-    "Goes On At": "Number of places where nothing was felt yet, although the object goes on there",
+    "Felt": "Share of the object's area that the surface is within the tolerance of",
     "Tolerance": "Standard deviation to reach for the height of each patch",
     "Off the Mesh": "Mean distance of the surface from the mesh and of the mesh from the surface",
     "Edge Length": "Typical length of the surface's edges, at most about a quarter of the thinnest wall",

@@ -12,6 +12,9 @@ from .arrays import read_array
 from .types import Array, Object
 
 SEEN = 100  # The faults of this many shapes are kept, because a mesh of a million faces takes a second.
+ROUNDED = (
+    1e-3  # Where vertices are rounded by more of the size, faces coincide: touches say so by themselves.
+)
 _faults: dict[tuple[int, int], str] = {}
 
 
@@ -21,6 +24,8 @@ def require_oriented(evaluated: Object, co: Array) -> None:
     co : (n, 3), the coordinates of its vertices
     """
     mesh, name = evaluated.data, evaluated.name
+    if np.spacing(np.abs(co).max()) > ROUNDED * np.ptp(co, axis=0).max():
+        return
     index: Any = mesh.attributes.get(".corner_vert")  # It is 100 times as fast. There is none in edit mode.
     items, key = (mesh.loops, "vertex_index") if index is None else (index.data, "value")
     corners = read_array(items, key, dtype=np.int32)

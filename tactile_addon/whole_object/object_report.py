@@ -116,7 +116,7 @@ def object_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("Contacts", record.get("contacts")),
         # It is never "Closed" where touches could go on.
         ("Surface", "Closed" if record["is_closed"] else "Incomplete" if record.get("uncovered") else "Open"),
-        ("Goes On At", many(record["uncovered"], "place", "places") if record.get("uncovered") else None),
+        ("Felt", within(record["felt"], False) if record.get("uncovered") else None),
         ("Tolerance", _tolerance(record)),
         ("Height", f"± {units.say(record['height_std'], 1, unit_of(record))}"),
         # Where touches could go on, most of it would be the object that was not felt.
@@ -141,7 +141,7 @@ def _surface(record: Mapping[str, Any]) -> str:
     if record["is_closed"]:
         return "closed all round"
     if record.get("uncovered"):
-        return f"the object goes on at {many(record['uncovered'], 'place', 'places')}"
+        return f"{within(record['felt'], False)} of the object"
     return "open where the object ends" if record["status"] == "ok" else "open where nothing was felt"
 
 

@@ -34,7 +34,7 @@ class ObjectTouches:
     """Touches of an evaluated mesh that begin at one place, in the directions of the world.
 
     surface : the mesh as it was, relative to its object's origin
-    found : core.Reconstructions of the touches so far
+    explored, found : core.Explorations of the touches so far, and their core.Reconstructions
     rims : how far the finger feels each of their patches all round, (AZIMUTHS,), lengths
     done : the number of touches so far, including those that gave no patch
     uncovered : the number of places that are known to be uncovered
@@ -71,18 +71,24 @@ class ObjectTouches:
         self.tolerance = tolerance or tolerance_of(self.surface.size, accuracy, noise)
         self._require_lengths(noise, edge)
         self.noise, self.seed, self.most, self.edge = noise, seed, most, edge
-        self.found: list[core.Reconstruction] = []
-        self.rims: list[Array] = []
-        self.done, self.uncovered = 0, 0
-        self.words, self.share = "Looking for a place to begin", 0.0
-        self.is_stopped = self._is_cut_short = False
-        self._left = self._spread()
-        self._rounds, self._joined, self._is_joining = 0, 0, False  # The joinings, and the touches before.
-        self._area = self._faceted = 0.0
+        self._begin(())
         self._start = None
         if location is not None:
             at = np.subtract(location, self.surface.origin)
             self._start = nearest_point(self.surface, at, AWAY * self.surface.size)
+
+    def _begin(self, earlier: Sequence[core.Exploration]) -> None:
+        """Prepares the `steps` of touches that go on from earlier ones."""
+        self._earlier, self._in_vain = earlier, self.done - len(earlier) if earlier else 0
+        self.explored: list[core.Exploration] = []
+        self.found: list[core.Reconstruction] = []
+        self.rims: list[Array] = []
+        self.done, self.uncovered = 0, 0
+        self.words, self.share = "Looking for a place to begin", 0.0
+        self.is_stopped = False
+        self._left = self._spread()
+        self._rounds, self._joined, self._is_joining = 0, 0, False  # The joinings, and the touches before.
+        self._area = self._faceted = 0.0
 
     def _require_lengths(self, noise: float, edge: float) -> None:
         """Raises ValueError, with a sentence, for lengths that are too large or too small for this object."""
@@ -136,8 +142,9 @@ class ObjectTouches:
                 outward,
                 tolerance=self.tolerance,
                 noise=self.noise,
-                most=self.most,
+                most=self.most - self._in_vain,
                 rng=self.seed,
+                earlier=self._earlier,
             )
             try:
                 return steps, next(steps)
@@ -165,6 +172,7 @@ class ObjectTouches:
     def _note(self, state: core.Progress) -> None:
         for exploration, rim in zip(state.found, state.rims, strict=True):
             r = exploration.result
+            self.explored.append(exploration)
             self.found.append(r)
             self.rims.append(rim)
             self._area += r.domain.area
@@ -172,8 +180,8 @@ class ObjectTouches:
                 r, self.surface.face_near, self.surface.corners_of
             )
             self._left = self._left[~core.covered_by(r, rim, self._left, self.tolerance)]
-        self.done, self.uncovered = state.done, state.uncovered
-        touches, places = many(state.done, "touch", "touches"), many(state.uncovered, "place", "places")
+        self.done, self.uncovered = self._in_vain + state.done, state.uncovered
+        touches, places = many(self.done, "touch", "touches"), many(state.uncovered, "place", "places")
         patches = many(len(self.found), "patch", "patches")
         if state.joining is None:
             self._is_joining = False
@@ -221,15 +229,27 @@ class ObjectTouches:
         again.edge, again.share, again.whole = edge, 0.0, WholeSurface(self.whole.atlas, self.surface.origin)
         return again
 
+    def continued(self, tolerance: float, more: int) -> "ObjectTouches":
+        """These touches, whose `steps` go on from where they ended, to a tolerance and by `more` at most.
+
+        Raises ValueError, with a sentence, for a tolerance that does not suit the object.
+        """
+        again = copy(self)
+        again.tolerance, again.most = tolerance, self.done + more
+        again._require_lengths(self.noise, self.edge)
+        again._begin(self.explored)
+        return again
+
     def stop(self) -> None:
         """Makes the steps touch no more, and join the patches so far."""
-        self.is_stopped = self._is_cut_short = True
+        self.is_stopped = True
 
     def report(self) -> dict[str, Any]:
         """What was found, as a dict of plain values."""
         found = {
             "touches": self.done,
             "uncovered": len(self.whole.atlas.uncovered),
+            "felt": self.compared.felt,
             **self.whole.report(),
             "faceted": self._faceted / self._area,
             "within": self.compared.within,
@@ -249,11 +269,17 @@ class ObjectTouches:
         """The status and the message of what was found: those of its atlas, unless the mesh explains more."""
         status, message, unit = found["status"], found["message"], unit_of(found)
         advice = "use a shorter edge length" if self.edge else "use a smaller tolerance"
-        if found["uncovered"] and self._is_cut_short:
-            places = many(found["uncovered"], "place", "places")
-            return "uncertain", f"Touching was stopped, and the object goes on at {places}: touch it again."
         if found["uncovered"]:
-            return status, message
+            felt, gap = within(found["felt"], False), length(self.compared.largest, unit)
+            if self.whole.atlas.is_cut_short:
+                return "uncertain", (
+                    f"Touching ended when {felt} of the object was felt, and the rest is up to {gap} away: "
+                    "continue with more touches."
+                )
+            return "uncertain", (
+                f"{felt} of the object was felt, and touches found no patch beyond, up to {gap} away: "
+                "continue with a smaller tolerance."
+            )
         if self.compared.largest > OFF_TOLERANCES * self.tolerance:
             off = length(self.compared.largest, unit)
             if self.surface.has_rims() and not (self.edge and status == "ok"):

@@ -110,6 +110,32 @@ def test_only_the_last_surface_can_be_meshed_again(empty, surface, ball):
 
 
 @pytest.mark.long
+@pytest.mark.long
+def test_an_incomplete_surface_is_continued_where_it_ended(empty, ball):
+    surface, few = made(empty.ops.tactile.touch_all_over, "tactile_object", tolerance=0.01, most=4)
+    assert few["uncovered"] and few["felt"] < 0.9
+    objects = len(empty.data.objects)
+    assert empty.ops.tactile.continue_touching(more=2) == {"FINISHED"}
+    record = surface["tactile_object"].to_dict()
+    assert (record["touches"], record["most"]) == (6, 6)
+    assert record["felt"] > few["felt"]
+    assert empty.ops.tactile.continue_touching() == {"FINISHED"}
+    record = surface["tactile_object"].to_dict()
+    assert (record["status"], record["is_closed"], record["tolerance"]) == ("ok", True, few["tolerance"])
+    assert empty.ops.tactile.continue_touching(tolerance=0.005) == {"FINISHED"}
+    finer = surface["tactile_object"].to_dict()
+    assert (finer["status"], finer["tolerance"]) == ("ok", pytest.approx(0.005))
+    assert finer["deviation_mean"] < record["deviation_mean"]
+    assert len(empty.data.objects) == objects
+    with pytest.raises(RuntimeError, match="is finer than the coordinates of"):
+        empty.ops.tactile.continue_touching(tolerance=1e-9)
+    ball.data.vertices[0].co.x += 1e-3
+    ball.data.update()
+    with pytest.raises(RuntimeError, match="was changed while it was touched: start again"):
+        empty.ops.tactile.continue_touching()
+    assert surface["tactile_object"].to_dict() == finer
+
+
 def test_a_range_is_given_in_the_unit_of_the_legend(surface):
     own = surface["tactile_object"]["color_limit"]
     surface.tactile_range = 2.0

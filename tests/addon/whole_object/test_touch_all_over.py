@@ -130,8 +130,8 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball, extension):
     assert not record["is_closed"]
     assert record["uncovered"] > 0
     rows = dict(extension.tactile_addon.whole_object.object_report.object_rows(record))
-    places = f"{record['uncovered']} places"
-    assert (rows["Surface"], rows["Goes On At"]) == ("Incomplete", places)
+    share = f"{np.floor(1e3 * record['felt']) / 10:g} %"
+    assert (rows["Surface"], rows["Felt"]) == ("Incomplete", share)
     # Its far side does not show through where nothing was felt.
     assert not surface.show_in_front
     assert surface["tactile_above"] > 0.0
@@ -140,9 +140,11 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball, extension):
     assert np.linalg.norm(record["deviation_place"]) == pytest.approx(2.0, abs=0.01)
     assert np.abs(values(surface.data, "deviation")).max() < 0.1
     report = extension.tactile_addon.whole_object.object_report
-    assert report.object_verdict(record).startswith("Incomplete. The patches end at ")
-    assert "allow more touches" in record["message"]
-    assert report.object_summary(record) == f"Incomplete: 3 touches; the object goes on at {places}"
+    assert report.object_verdict(record).startswith(
+        f"Incomplete. Touching ended when {share} of the object was"
+    )
+    assert "continue with more touches" in record["message"]
+    assert report.object_summary(record) == f"Incomplete: 3 touches; {share} of the object"
     assert "Off the Mesh" not in rows  # Most of it would be what was not felt.
 
 

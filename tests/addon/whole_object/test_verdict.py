@@ -262,7 +262,7 @@ def test_closed_is_the_mesh_that_is_shown(extension, left_out, shown, uncovered,
     words = OK if status == "ok" else "Triangles of this edge length leave holes: use a shorter edge length."
     assert report["message"] == words
     rows = extension.tactile_addon.whole_object.object_report.object_rows
-    shown_rows = dict(rows(report | {"tolerance": 0.1, "uncovered": len(uncovered)}))
+    shown_rows = dict(rows(report | {"tolerance": 0.1, "uncovered": len(uncovered), "felt": 0.5}))
     assert shown_rows["… No Curvature"] == "1"
     assert shown_rows["Surface"] == ("Closed" if is_closed else "Incomplete" if uncovered else "Open")
 
@@ -347,8 +347,12 @@ def test_who_stops_it_gets_no_advice_to_allow_more_touches(ball, touches_of):
         if touches.done >= 3:
             touches.stop()
     report = touches.report()
-    places = f"{report['uncovered']} places"
-    assert report["message"] == f"Touching was stopped, and the object goes on at {places}: touch it again."
+    assert re.fullmatch(
+        r"Touching ended when [\d.]+ % of the object was felt, and the rest is up to [\d.]+ m away: continue "
+        "with more touches.",
+        report["message"],
+    )
+    assert report["felt"] == report["within"] < 0.7
 
 
 @pytest.mark.long

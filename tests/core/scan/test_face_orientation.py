@@ -5,8 +5,7 @@
 import numpy as np
 import pytest
 
-import core
-from core.scan import face_orientation
+from core.scan.face_orientation import DOUBLED, INWARD, open_edges, orientation_fault
 
 BOX = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -24,7 +23,7 @@ def mesh(*parts):
 
 
 def fault(*parts):
-    return core.orientation_fault(*mesh(*parts))
+    return orientation_fault(*mesh(*parts))
 
 
 def turned(faces):
@@ -116,13 +115,13 @@ def test_right_faces_are_no_fault(parts, shift):
     ids=["box", "soup", "ball", "hole", "apart", "cavity", "one", "half", "sheet"],
 )
 def test_faces_that_point_inward_are_found(parts):
-    assert fault(*parts) == core.INWARD
+    assert fault(*parts) == INWARD
 
 
 @pytest.mark.parametrize("points", [BOX, BOX[np.arange(8)] + 3.0])
 def test_faces_on_others_are_found(points):
-    assert fault((points, QUADS), (points, turned(QUADS))) == core.DOUBLED
-    assert fault((points, QUADS + turned(QUADS))) == core.DOUBLED
+    assert fault((points, QUADS), (points, turned(QUADS))) == DOUBLED
+    assert fault((points, QUADS + turned(QUADS))) == DOUBLED
 
 
 def test_faces_on_others_that_face_the_same_way_are_felt_as_one():
@@ -135,7 +134,7 @@ def test_a_few_faces_on_others_are_no_doubled_mesh():
 
 
 def test_edges_of_one_face_are_open():
-    assert not len(face_orientation.open_edges(*mesh(SOUP)))
-    found = face_orientation.open_edges(*mesh((BOX, QUADS[:5])))
+    assert not len(open_edges(*mesh(SOUP)))
+    found = open_edges(*mesh((BOX, QUADS[:5])))
     assert found.shape == (4, 2, 3)
     assert (found[..., 2] == 1.0).all()
