@@ -12,6 +12,7 @@ from ..comparison.register_operator import TACTILE_OT_register
 from ..comparison.verification_wording import verification_rows, verification_table
 from ..comparison.verify_operator import TACTILE_OT_verify
 from ..probes import number_fields, probe
+from ..probes.in_slices import draw_running
 from ..probes.operators import NO_MESH
 from ..probes.probe_operators import (
     TACTILE_OT_add_plane,
@@ -192,6 +193,7 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
 
     def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
         layout.operator(TACTILE_OT_touch_all_over.bl_idname, icon="MESH_UVSPHERE")
+        draw_running(layout)
         if obj is None or patch_record.ATLAS_RECORD not in obj:
             return
         record = obj[patch_record.ATLAS_RECORD]
@@ -201,7 +203,7 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         if words := facets(record):
             draw_sentence(context, layout, words, "ERROR")
             layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
-        if record.get("uncovered"):
+        if record.get("uncovered") and record["status"] != "outdated":
             layout.operator(TACTILE_OT_continue_touching.bl_idname, icon="PLAY")
         _draw_colors(context, layout, obj, "tactile_colors")
         if patch_record.is_colored(obj):

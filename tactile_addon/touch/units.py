@@ -95,3 +95,13 @@ def symbol(power: int, unit: Unit) -> str:
     """The unit of length^power, such as "mm" or "1/mm²"; "" for a plain number or if lengths have no unit."""
     name = unit[0] if power else ""
     return f"1/{name}{SUPERSCRIPTS[-power]}" if name and power < 0 else name
+
+
+def about(number: float) -> int:
+    """A number with one significant digit, as an estimate has it."""
+    return int(float(f"{number:.0e}"))
+
+
+def duration(seconds: float) -> str:
+    """An estimated time in words."""
+    return f"{about(max(seconds, 1.0))} s" if seconds < 60.0 else f"{about(seconds / 60.0)} min"

@@ -14,6 +14,7 @@ from ...core.triangles import triangle_cross
 from ..touch import units
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Object
+from .object_report import FACETED
 from .object_touches import tolerance_of
 
 PLACES, SEED = 600, 0  # A few of these random places are touched for the estimate.
@@ -32,6 +33,7 @@ class Expected:
         self._given: tuple[Any, ...] | None = None
         self._mesh: DetachedMesh | None = None
         self._words = ""
+        self.is_faceted = False  # Whether touches would feel the facets of the object one by one.
 
     def words(
         self, target: Object, context: bpy.types.Context, tolerance: float, accuracy: str, noise: float
@@ -40,41 +42,41 @@ class Expected:
 
         Raises ValueError, with a sentence, for an object that cannot be touched.
         """
-        given = target.session_uid, tolerance, accuracy, noise
+        depsgraph = context.evaluated_depsgraph_get()
+        shape = target.session_uid, len(target.evaluated_get(depsgraph).data.vertices)
+        given = shape, tolerance, accuracy, noise
         if given != self._given:
-            if self._given is None or self._given[0] != target.session_uid:
-                self._mesh = DetachedMesh(target, context.evaluated_depsgraph_get())
+            if self._given is None or self._given[0] != shape:
+                self._mesh = DetachedMesh(target, depsgraph)
             tolerance = tolerance or tolerance_of(self._mesh.size, accuracy, noise)
-            touches, seconds = expected(self._mesh, tolerance, noise)
+            touches, seconds, share = expected(self._mesh, tolerance, noise)
+            self.is_faceted = share >= FACETED
             self._given = given
-            about = f"{many(touches, 'touch', 'touches')}, {_time(seconds)}"
+            about = f"{many(touches, 'touch', 'touches')}, {units.duration(seconds)}"
             unit = units.unit_of_report(context.scene, {"tolerance": tolerance})  # as the panel has
             self._words = f"Tolerance {units.length(tolerance, unit)}: about {about}"
         return self._words
 
 
-def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, float]:
-    """About how many touches a DetachedMesh takes, and seconds. Raises ValueError if none is possible."""
+def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, float, float]:
+    """About how many touches a DetachedMesh takes, seconds, and the share of its area with few facets.
+
+    Raises ValueError if no touch is possible.
+    """
     import scipy.interpolate  # noqa: F401  # The import takes half a second, which is not a touch's.
 
     area = 0.5 * float(np.linalg.norm(triangle_cross(mesh.points[mesh.triangles]), axis=1).sum())
     places = core.scattered(mesh.points, mesh.triangles, PLACES, np.random.default_rng(SEED))
     begin = perf_counter()
-    touches, tried = core.expected_touches(mesh, *places, area, tolerance=tolerance, noise=noise, rng=SEED)
+    options = {"tolerance": tolerance, "noise": noise, "rng": SEED}
+    touches, tried, patches = core.expected_touches(mesh, *places, area, **options)
     each = (perf_counter() - begin) / tried
+    areas = np.array([r.domain.area for r in patches])
+    few = [core.has_few_facets(r, mesh.face_near, mesh.corners_of) for r in patches]
     meshing = MESHING * fineness(core.thinnest_wall(mesh, *places, mesh.size) / mesh.size)
-    return _rounded(touches), (meshing + JOINING * touches) * each
+    return units.about(touches), (meshing + JOINING * touches) * each, float(np.average(few, weights=areas))
 
 
 def fineness(wall: float) -> float:
     """How many times as many triangles a surface has if its thinnest wall has this share of the size."""
     return float(np.clip(1.0 / wall, THIN, THINNEST) / THIN) ** 2
-
-
-def _rounded(number: float) -> int:
-    """A number with one significant digit, as an estimate has it."""
-    return int(float(f"{number:.0e}"))
-
-
-def _time(seconds: float) -> str:
-    return f"{_rounded(max(seconds, 1.0))} s" if seconds < 60.0 else f"{_rounded(seconds / 60.0)} min"

@@ -17,6 +17,7 @@ from ..probes.operators import (
     report_done,
     target_object,
 )
+from ..probes.probe_operators import TACTILE_OT_add_subdivision
 from ..scene import patch_record
 from ..touch.settings import NOISE, UNSAVED, draw_chosen, given, length_property
 from ..touch.types import Outcome
@@ -158,6 +159,10 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, fields = self.layout, self._draw_target(context)
+        if self._expected is not None and self._expected.is_faceted:
+            layout.label(text="Touches will feel its facets one by one", icon="ERROR")
+            button = layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
+            button.target = self.target
         row = layout.row()
         row.active = not self.tolerance
         row.prop(self, "accuracy", expand=True)

@@ -189,6 +189,16 @@ def test_a_dialog_can_tell_how_many_touches_there_will_be(extension, empty, ball
     assert expected.words(ball, empty.context, 0.005, "normal", 0.0) != words
 
 
+def test_a_dialog_can_tell_that_facets_will_be_felt(extension, empty):
+    expected = extension.tactile_addon.whole_object.expected.Expected()
+    empty.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
+    obj = empty.context.object
+    for is_faceted in (True, False):
+        expected.words(obj, empty.context, 0.0, "normal", 0.0)
+        assert expected.is_faceted is is_faceted
+        assert empty.ops.tactile.add_subdivision(target=obj.name) == {"FINISHED"}
+
+
 def test_the_mesh_of_thin_walls_is_fine(extension):
     """Each halving of a wall halves edges, until the grid is as fine as it may be."""
     fineness = extension.tactile_addon.whole_object.expected.fineness

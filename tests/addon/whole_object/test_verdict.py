@@ -201,6 +201,9 @@ def test_a_whole_object_of_facets_says_that_its_curvature_is_theirs(empty, exten
         "FINISHED"
     }  # and says that it is subdivided: touch it all over again
     assert [(m.type, m.levels) for m in source.modifiers] == [("SUBSURF", 3)]
+    outdated = "Outdated. The object was subdivided since it was touched: touch it all over again."
+    record = empty.context.object["tactile_object"].to_dict()
+    assert (report.object_verdict(record), report.facets(record)) == (outdated, None)
     empty.context.view_layer.objects.active = source
     assert report.facets(touched(empty, most=4)[1]) is None
 
