@@ -82,11 +82,13 @@ def touch_all_over(
     most: int = MOST,
     rng: np.random.Generator | int | None = None,
     earlier: Sequence[Exploration] = (),
+    off: Sequence[PointNormal] = (),
 ) -> Steps:
     """Does what `explore_object` does in steps: yields a Progress after each, and returns the Atlas.
 
     earlier : touches of the same surface that were found before, from which these go on in place of the
         point; they count as touches
+    off : contacts off the surface that was made of these, which are touched first
 
     If it is sent anything false other than None, it stops touching and joins the patches so far. Arguments
     and errors are those of `explore_object`; errors are raised in the first step.
@@ -105,6 +107,8 @@ def touch_all_over(
         yield from run.taking_up(earlier)
     if not run.found:
         yield from run.show(run.first(p, up))
+    if off:
+        yield from run.going_on(off, float(run.frontier.charts.radii.max()))
     yield from _all_over(run)
     return (yield from _joined_and_refined(run))
 

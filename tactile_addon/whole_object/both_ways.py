@@ -49,6 +49,7 @@ class BothWays:
         self.mean, self.within, self.felt = 0.0, 1.0, 1.0
         self.largest, self.place = 0.0, mesh.vertices[0]
         self._trees: list[BVHTree] = []  # of the surface
+        self._noted: list[tuple[float, Array]] = []  # The farthest places that were found, with distances.
         self._apart = 0.0  # How far places are apart, about.
 
     def steps(self) -> Iterator[float]:
@@ -185,8 +186,19 @@ class BothWays:
 
     def _note(self, points: Array, off: Array) -> None:
         """Keeps the largest of the distances (n,) of points (n, 3)."""
-        if len(off) and off.max() > self.largest:
-            self.largest, self.place = float(off.max()), points[np.argmax(off)]
+        if len(off):
+            farthest = int(np.argmax(off))
+            self._noted.append((float(off[farthest]), points[farthest]))
+            if off[farthest] > self.largest:
+                self.largest, self.place = self._noted[-1]
+
+    def far_places(self, length: float) -> list[Array]:
+        """Places (3,) that are farther off than a length, the farthest first, and so far apart."""
+        found: list[Array] = []
+        for off, place in sorted(self._noted, key=lambda noted: -noted[0]):
+            if off > length and all(np.linalg.norm(place - other) > length for other in found):
+                found.append(place)
+        return found
 
 
 def _directions() -> Array:

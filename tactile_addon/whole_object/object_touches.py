@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Touches that grow over an object, step by step, with nothing changed in the scene."""
 
+import math
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
@@ -23,7 +24,11 @@ from .whole_surface import WholeSurface
 # These lengths are shares of the object's size.
 TOLERANCE_SHARES = {"quick": 1.0 / 200.0, "normal": 1.0 / 500.0, "fine": 1.0 / 1250.0}
 LARGEST_TOLERANCE, LARGEST_EDGE = 0.1, 0.5  # With more, neither patches nor triangles would fit.
-STARTS = 20  # The number of places to begin that are tried if none is given.
+STARTS = 20  # The number of places to begin that are tried, besides the one that is given.
+# A place is tried first if it has this share of the size of room, and is taken if its patch has a mean radius
+# of so many tolerances: touches would not go on from a smaller one.
+ROOM, GOOD_START, HAIR = 0.05, 5.0, 1e-5
+ROUNDS = 2  # Touches go on this often where the surface is far off the mesh: rocker-arm (benchmarks.models).
 PLACES, SEED = 1000, 0  # The progress is the share of this many places on the mesh that patches cover.
 # Of all that is to be done, touching and joining are done at these shares; of touching and joining again,
 # touching is done at the last one.
@@ -85,7 +90,8 @@ class ObjectTouches:
         self.rims: list[Array] = []
         self.done, self.uncovered = 0, 0
         self.words, self.share = "Looking for a place to begin", 0.0
-        self.is_stopped = False
+        self.is_stopped = self._was_stopped = False
+        self._off: list[tuple[Any, Any]] = []
         self._left = self._spread()
         self._rounds, self._joined, self._is_joining = 0, 0, False  # The joinings, and the touches before.
         self._area = self._faceted = 0.0
@@ -120,7 +126,22 @@ class ObjectTouches:
             )
 
     def steps(self) -> Iterator[None]:
-        """Does everything, as a generator that yields every few hundredths of a second."""
+        """Does everything, as a generator that yields every few hundredths of a second.
+
+        Where the surface turns out to be far off the mesh, touches go on, ROUNDS times at most.
+        """
+        for left in range(ROUNDS, -1, -1):
+            yield from self._touching()
+            yield from self.meshing(JOINED)
+            self._off = self._places_off()
+            is_ended = self._was_stopped or self.whole.atlas.is_cut_short or self.edge
+            if is_ended or not left or not self._off:
+                return
+            self._earlier = tuple(self.explored)
+
+    def _touching(self) -> Iterator[None]:
+        """Makes and joins the touches."""
+        self.is_stopped = self._was_stopped
         steps, state = self._started()
         while True:
             self._note(state)
@@ -129,12 +150,20 @@ class ObjectTouches:
                 state = steps.send(False if self.is_stopped else None)
             except StopIteration as end:
                 self.whole = WholeSurface(end.value, self.surface.origin)
-                break
-        yield from self.meshing(JOINED)
+                return
+
+    def _places_off(self) -> list[tuple[Any, Any]]:
+        """Places of the mesh, and normals there, near which the surface is too far off for a good verdict."""
+        found = []
+        for place in self.compared.far_places(OFF_TOLERANCES * self.tolerance):
+            with suppress(ValueError):  # The face has no area.
+                found.append(self.surface.project(place)[:2])
+        return found
 
     def _started(self) -> tuple[Generator[core.Progress, bool | None, core.Atlas], core.Progress]:
         """The steps of core, and the Progress of the first. Raises ValueError if touches cannot begin."""
         why: Exception | str = "no face has an area"
+        begun: list[tuple[float, Any, core.Progress]] = []
         for point, outward in self._places():
             steps = core.touch_all_over(
                 self.surface,
@@ -145,22 +174,38 @@ class ObjectTouches:
                 most=self.most - self._in_vain,
                 rng=self.seed,
                 earlier=self._earlier,
+                off=self._off,
             )
             try:
-                return steps, next(steps)
+                state = next(steps)
             except ValueError as error:
                 why = error
-        raise ValueError(f"Touching could not begin: choose another location or tolerance ({why})")
+                continue
+            begun.append((max(map(np.mean, state.rims)), steps, state))
+            if begun[-1][0] >= GOOD_START * self.tolerance:
+                break
+        if not begun:
+            raise ValueError(f"Touching could not begin: choose another location or tolerance ({why})")
+        _, steps, state = max(begun, key=lambda each: each[0])
+        return steps, state
 
-    def _places(self) -> Iterator[tuple[Any, Any]]:
-        """Places where the touches may begin, with their normals."""
-        if self._start is not None:
-            yield self._start
-            return
+    def _places(self) -> list[tuple[Any, Any]]:
+        """Places where the touches may begin, with their normals, those in slits and on ridges last."""
+        found = [] if self._start is None else [self._start]
         faces = np.random.default_rng(self.seed).permutation(self.surface.faces)[:STARTS]
         for middle in self.surface.points[faces].mean(axis=1):  # It is off all edges.
             with suppress(ValueError):  # The face has no area.
-                yield self.surface.project(middle)[:2]
+                found.append(self.surface.project(middle)[:2])
+        return sorted(found, key=lambda place: -min(self._room(*place), ROOM * self.surface.size))
+
+    def _room(self, point: Any, outward: Any) -> float:
+        """How far a place is from the next wall before it, or below it if that is nearer."""
+        size, rooms = self.surface.size, []
+        for way in (np.array(outward), -np.array(outward)):
+            start = point + HAIR * size * way
+            hit = self.surface.ray_cast(start.tolist(), way.tolist(), size)
+            rooms.append(size if hit is None else math.dist(hit[0], start))
+        return min(rooms)
 
     def _spread(self) -> Array:
         """Places all over the mesh, (PLACES, 3), of which patches will cover more and more."""
@@ -171,6 +216,8 @@ class ObjectTouches:
 
     def _note(self, state: core.Progress) -> None:
         for exploration, rim in zip(state.found, state.rims, strict=True):
+            if any(exploration is other for other in self.explored):
+                continue  # It is taken up.
             r = exploration.result
             self.explored.append(exploration)
             self.found.append(r)
@@ -210,12 +257,12 @@ class ObjectTouches:
         """Makes the mesh and compares it in steps, from the share `start` of all on."""
         self.words, self.is_stopped = "Meshing", True
         for share in self.whole.steps(self.edge):
-            self.share = start + (1.0 - start) * 0.6 * share
+            self.share = max(self.share, start + (1.0 - start) * 0.6 * share)
             yield
         self.words = "Comparing"
         self.compared = BothWays(self.surface, self.whole.mesh, self.tolerance)
         for share in self.compared.steps():
-            self.share = start + (1.0 - start) * (0.6 + 0.4 * share)
+            self.share = max(self.share, start + (1.0 - start) * (0.6 + 0.4 * share))
             yield
         self.whole.deviation = self.compared.deviation
 
@@ -242,7 +289,7 @@ class ObjectTouches:
 
     def stop(self) -> None:
         """Makes the steps touch no more, and join the patches so far."""
-        self.is_stopped = True
+        self.is_stopped = self._was_stopped = True
 
     def report(self) -> dict[str, Any]:
         """What was found, as a dict of plain values."""
