@@ -47,7 +47,7 @@ from .reconstruction.options import METHODS
 from .reconstruction.result import Reconstruction
 from .reconstruction.serialization import from_dict, to_dict
 from .reconstruction.status import CONTRADICTING, DOUBTFUL_STD
-from .scan.face_orientation import DOUBLED, INWARD, orientation_fault
+from .scan.face_orientation import DOUBLED, INWARD, open_edge_distance, orientation_fault
 from .scan.facets import has_few_facets, is_beside_bend
 from .scan.pose_search import Pose, register
 from .scan.sampling import scattered, spaced, spaced_count
@@ -109,6 +109,7 @@ __all__ = [
     "judged_by_mesh",
     "mean_height_stds",
     "mesh_error",
+    "open_edge_distance",
     "orientation_fault",
     "overlapped",
     "reachable",

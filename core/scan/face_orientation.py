@@ -5,7 +5,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array
 from ..triangles import row_dot, triangle_cross
@@ -55,10 +55,17 @@ def orientation_fault(points: Array, corners: Indices, starts: Indices) -> str:
     return INWARD if _is_inside_out(points, sides, corners[starts]) else ""
 
 
-def open_edges(points: Array, corners: Indices, starts: Indices) -> Array:
-    """The ends (k, 2, 3) of the edges that have one face, as around holes; arguments as above."""
+def open_edge_distance(points: Array, corners: Indices, starts: Indices, place: ArrayLike) -> float:
+    """How far a place (3,) is from the nearest edge that has one face, as around a hole; inf without any.
+
+    points, corners, starts : as in `orientation_fault`
+    """
+    points, corners, starts = np.asarray(points, float), np.asarray(corners, int), np.asarray(starts, int)
     sides = _sides_of(points, corners, starts)
-    return points[np.column_stack([sides.start, sides.end])[sides.shared == 1]]
+    start, end = points[sides.start[sides.shared == 1]], points[sides.end[sides.shared == 1]]
+    along, away = end - start, np.asarray(place, dtype=float) - start
+    shares = np.clip(row_dot(away, along) / row_dot(along, along), 0.0, 1.0)
+    return float(np.linalg.norm(away - shares[:, None] * along, axis=1).min(initial=np.inf))
 
 
 def _sides_of(points: Array, corners: Indices, starts: Indices) -> _Sides:

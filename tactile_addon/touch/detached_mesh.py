@@ -12,6 +12,7 @@ import numpy as np
 from mathutils import Matrix
 from mathutils.bvhtree import BVHTree
 
+from ... import core
 from .arrays import read_array
 from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, require_in_scene
 from .oriented import require_oriented
@@ -101,13 +102,9 @@ class DetachedMesh(PlacedMesh):
         self._compared_until = 0.0
         return self.require_source(context)
 
-    def has_rims(self) -> bool:
-        """Whether edges have one face only, as around holes. Vertices in one place count as one."""
-        _, same = np.unique(self.points, axis=0, return_inverse=True)
-        ends = np.sort(same.ravel()[self.triangles[:, [[0, 1], [1, 2], [2, 0]]]].reshape(-1, 2), axis=1)
-        ends = ends[ends[:, 0] < ends[:, 1]]
-        _, faces = np.unique(ends, axis=0, return_counts=True)
-        return bool((faces == 1).any())
+    def open_edge_distance(self, place: Array) -> float:
+        """How far a place is from the nearest edge that has one face only, as around a hole."""
+        return core.open_edge_distance(self.points, self._corners, self._starts[:-1], place)
 
     @property
     def origin(self) -> Array:

@@ -32,6 +32,7 @@ Nearest: TypeAlias = Callable[[Point], tuple[Point, float]]
 class BothWays:
     """The deviations of a surface from the mesh that was touched, and back, found step by step.
 
+    vertices : (n, 3), those of the surface
     deviation : (n,), signed distances of the surface from the mesh, positive outside it: of each vertex, or
         of a place on a face around it that is farther off, as both ends of a long edge may be on the mesh
     mean : the mean distance of the surface from the mesh and of the mesh from the surface, by area
@@ -45,6 +46,7 @@ class BothWays:
     def __init__(self, target: DetachedMesh, mesh: core.Mesh, tolerance: float) -> None:
         """`target` is the DetachedMesh that was touched, and `mesh` the core.Mesh of what was felt."""
         self._target, self._mesh, self._tolerance = target, mesh, tolerance
+        self.vertices = mesh.vertices
         self.deviation = np.zeros(len(mesh.vertices))
         self.mean, self.within, self.felt = 0.0, 1.0, 1.0
         self.largest, self.place = 0.0, mesh.vertices[0]

@@ -14,6 +14,7 @@ from ...core.triangles import triangle_cross
 from ..touch import units
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Object
+from .farthest_place import THIN_SHARE
 from .object_report import FACETED
 from .object_touches import tolerance_of
 
@@ -34,6 +35,7 @@ class Expected:
         self._mesh: DetachedMesh | None = None
         self._words = ""
         self.is_faceted = False  # Whether touches would feel the facets of the object one by one.
+        self.warnings: list[str] = []
 
     def words(
         self, target: Object, context: bpy.types.Context, tolerance: float, accuracy: str, noise: float
@@ -43,14 +45,18 @@ class Expected:
         Raises ValueError, with a sentence, for an object that cannot be touched.
         """
         depsgraph = context.evaluated_depsgraph_get()
-        shape = target.session_uid, len(target.evaluated_get(depsgraph).data.vertices)
+        vertices = target.evaluated_get(depsgraph).data.vertices if target.type == "MESH" else ()
+        shape = target.session_uid, len(vertices)
         given = shape, tolerance, accuracy, noise
         if given != self._given:
             if self._given is None or self._given[0] != shape:
                 self._mesh = DetachedMesh(target, depsgraph)
             tolerance = tolerance or tolerance_of(self._mesh.size, accuracy, noise)
-            touches, seconds, share = expected(self._mesh, tolerance, noise)
+            touches, seconds, share, wall = expected(self._mesh, tolerance, noise)
             self.is_faceted = share >= FACETED
+            self.warnings = ["Touches will feel its facets one by one"] if self.is_faceted else []
+            if wall < THIN_SHARE:
+                self.warnings.append(f"Walls of {100.0 * wall:.2g} % of its size may be bridged or pierced")
             self._given = given
             about = f"{many(touches, 'touch', 'touches')}, {units.duration(seconds)}"
             unit = units.unit_of_report(context.scene, {"tolerance": tolerance})  # as the panel has
@@ -58,8 +64,8 @@ class Expected:
         return self._words
 
 
-def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, float, float]:
-    """About how many touches a DetachedMesh takes, seconds, and the share of its area with few facets.
+def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, float, float, float]:
+    """About how many touches a DetachedMesh takes, seconds, its share with few facets, its thinnest wall's.
 
     Raises ValueError if no touch is possible.
     """
@@ -73,8 +79,9 @@ def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, f
     each = (perf_counter() - begin) / tried
     areas = np.array([r.domain.area for r in patches])
     few = [core.has_few_facets(r, mesh.face_near, mesh.corners_of) for r in patches]
-    meshing = MESHING * fineness(core.thinnest_wall(mesh, *places, mesh.size) / mesh.size)
-    return units.about(touches), (meshing + JOINING * touches) * each, float(np.average(few, weights=areas))
+    wall = core.thinnest_wall(mesh, *places, mesh.size) / mesh.size
+    share = float(np.average(few, weights=areas))
+    return units.about(touches), (MESHING * fineness(wall) + JOINING * touches) * each, share, wall
 
 
 def fineness(wall: float) -> float:

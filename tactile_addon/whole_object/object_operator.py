@@ -159,8 +159,9 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, fields = self.layout, self._draw_target(context)
+        for warning in self._expected.warnings if self._expected else ():
+            layout.label(text=warning, icon="ERROR")
         if self._expected is not None and self._expected.is_faceted:
-            layout.label(text="Touches will feel its facets one by one", icon="ERROR")
             button = layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
             button.target = self.target
         row = layout.row()

@@ -16,8 +16,9 @@ from ...core.arguments import many
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.touch_object import AWAY, nearest_point
 from ..touch.types import Array, Object
-from ..touch.units import length
+from ..touch.units import Unit, length
 from .both_ways import BothWays
+from .farthest_place import why_far
 from .object_report import OFF_TOLERANCES, WITHIN_SHARE, unit_of, within
 from .whole_surface import WholeSurface
 
@@ -28,7 +29,6 @@ STARTS = 20  # The number of places to begin that are tried, besides the one tha
 # A place is tried first if it has this share of the size of room, and is taken if its patch has a mean radius
 # of so many tolerances: touches would not go on from a smaller one.
 ROOM, GOOD_START, HAIR = 0.05, 5.0, 1e-5
-ROUNDS = 2  # Touches go on this often where the surface is far off the mesh: rocker-arm (benchmarks.models).
 PLACES, SEED = 1000, 0  # The progress is the share of this many places on the mesh that patches cover.
 # Of all that is to be done, touching and joining are done at these shares; of touching and joining again,
 # touching is done at the last one.
@@ -90,8 +90,7 @@ class ObjectTouches:
         self.rims: list[Array] = []
         self.done, self.uncovered = 0, 0
         self.words, self.share = "Looking for a place to begin", 0.0
-        self.is_stopped = self._was_stopped = False
-        self._off: list[tuple[Any, Any]] = []
+        self.is_stopped = False
         self._left = self._spread()
         self._rounds, self._joined, self._is_joining = 0, 0, False  # The joinings, and the touches before.
         self._area = self._faceted = 0.0
@@ -126,22 +125,7 @@ class ObjectTouches:
             )
 
     def steps(self) -> Iterator[None]:
-        """Does everything, as a generator that yields every few hundredths of a second.
-
-        Where the surface turns out to be far off the mesh, touches go on, ROUNDS times at most.
-        """
-        for left in range(ROUNDS, -1, -1):
-            yield from self._touching()
-            yield from self.meshing(JOINED)
-            self._off = self._places_off()
-            is_ended = self._was_stopped or self.whole.atlas.is_cut_short or self.edge
-            if is_ended or not left or not self._off:
-                return
-            self._earlier = tuple(self.explored)
-
-    def _touching(self) -> Iterator[None]:
-        """Makes and joins the touches."""
-        self.is_stopped = self._was_stopped
+        """Does everything, as a generator that yields every few hundredths of a second."""
         steps, state = self._started()
         while True:
             self._note(state)
@@ -150,14 +134,17 @@ class ObjectTouches:
                 state = steps.send(False if self.is_stopped else None)
             except StopIteration as end:
                 self.whole = WholeSurface(end.value, self.surface.origin)
-                return
+                break
+        yield from self.meshing(JOINED)
 
-    def _places_off(self) -> list[tuple[Any, Any]]:
-        """Places of the mesh, and normals there, near which the surface is too far off for a good verdict."""
+    def _compare(self, mesh: core.Mesh) -> Generator[float, None, list[tuple[Any, Any]]]:
+        """Compares a mesh of the surface with the object; returns contacts where it is too far off."""
+        self.compared = BothWays(self.surface, mesh, self.tolerance)
+        yield from self.compared.steps()
         found = []
         for place in self.compared.far_places(OFF_TOLERANCES * self.tolerance):
             with suppress(ValueError):  # The face has no area.
-                found.append(self.surface.project(place)[:2])
+                found.append(self.surface.project(place.tolist())[:2])
         return found
 
     def _started(self) -> tuple[Generator[core.Progress, bool | None, core.Atlas], core.Progress]:
@@ -174,7 +161,7 @@ class ObjectTouches:
                 most=self.most - self._in_vain,
                 rng=self.seed,
                 earlier=self._earlier,
-                off=self._off,
+                compare=self._compare,
             )
             try:
                 state = next(steps)
@@ -216,8 +203,6 @@ class ObjectTouches:
 
     def _note(self, state: core.Progress) -> None:
         for exploration, rim in zip(state.found, state.rims, strict=True):
-            if any(exploration is other for other in self.explored):
-                continue  # It is taken up.
             r = exploration.result
             self.explored.append(exploration)
             self.found.append(r)
@@ -257,13 +242,15 @@ class ObjectTouches:
         """Makes the mesh and compares it in steps, from the share `start` of all on."""
         self.words, self.is_stopped = "Meshing", True
         for share in self.whole.steps(self.edge):
-            self.share = max(self.share, start + (1.0 - start) * 0.6 * share)
+            self.share = start + (1.0 - start) * 0.6 * share
             yield
         self.words = "Comparing"
-        self.compared = BothWays(self.surface, self.whole.mesh, self.tolerance)
-        for share in self.compared.steps():
-            self.share = max(self.share, start + (1.0 - start) * (0.6 + 0.4 * share))
-            yield
+        if (
+            self.compared.vertices is not self.whole.mesh.vertices
+        ):  # Else it was compared while it was touched.
+            for share in self._compare(self.whole.mesh):
+                self.share = start + (1.0 - start) * (0.6 + 0.4 * share)
+                yield
         self.whole.deviation = self.compared.deviation
 
     def again(self, edge: float) -> "ObjectTouches":
@@ -289,7 +276,7 @@ class ObjectTouches:
 
     def stop(self) -> None:
         """Makes the steps touch no more, and join the patches so far."""
-        self.is_stopped = self._was_stopped = True
+        self.is_stopped = True
 
     def report(self) -> dict[str, Any]:
         """What was found, as a dict of plain values."""
@@ -329,11 +316,8 @@ class ObjectTouches:
             )
         if self.compared.largest > OFF_TOLERANCES * self.tolerance:
             off = length(self.compared.largest, unit)
-            if self.surface.has_rims() and not (self.edge and status == "ok"):
-                return "uncertain", (
-                    f"The surface is up to {off} off the object, whose mesh has open edges, as around holes: "
-                    "close them, or use a smaller tolerance."
-                )
+            if not (self.edge and status == "ok") and (why := self._why_far(unit)):
+                return why
             if status != "ok":
                 return status, f"The surface is up to {off} off the object. {message}"
             return "uncertain", (
@@ -348,6 +332,13 @@ class ObjectTouches:
                 f"is {length(self.tolerance, unit)}: use a larger tolerance."
             )
         return status, message
+
+    def _why_far(self, unit: Unit) -> tuple[str, str] | None:
+        """The verdict on the place where surface and mesh are farthest apart, as `why_far` has it."""
+        place, mesh = self.compared.place, self.whole.mesh
+        nearest = int(mesh.patch[np.argmin(((mesh.vertices - place) ** 2).sum(axis=1))])
+        patch = self.found[nearest] if nearest >= 0 else None
+        return why_far(self.surface, place, self.compared.largest, patch, unit)
 
 
 def tolerance_of(size: float, accuracy: str, noise: float) -> float:

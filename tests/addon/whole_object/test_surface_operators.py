@@ -196,7 +196,17 @@ def test_a_dialog_can_tell_that_facets_will_be_felt(extension, empty):
     for is_faceted in (True, False):
         expected.words(obj, empty.context, 0.0, "normal", 0.0)
         assert expected.is_faceted is is_faceted
+        assert expected.warnings == ["Touches will feel its facets one by one"] * is_faceted
         assert empty.ops.tactile.add_subdivision(target=obj.name) == {"FINISHED"}
+
+
+def test_a_dialog_can_tell_that_walls_are_thin(extension, empty):
+    expected = extension.tactile_addon.whole_object.expected.Expected()
+    empty.ops.mesh.primitive_cube_add(size=1.0)
+    empty.context.object.scale.z = 0.01
+    empty.context.view_layer.update()
+    expected.words(empty.context.object, empty.context, 0.0, "normal", 0.0)
+    assert expected.warnings == ["Walls of 1 % of its size may be bridged or pierced"]
 
 
 def test_the_mesh_of_thin_walls_is_fine(extension):

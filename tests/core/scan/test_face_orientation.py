@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from core.scan.face_orientation import DOUBLED, INWARD, open_edges, orientation_fault
+from core.scan.face_orientation import DOUBLED, INWARD, open_edge_distance, orientation_fault
 
 BOX = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -134,7 +134,7 @@ def test_a_few_faces_on_others_are_no_doubled_mesh():
 
 
 def test_edges_of_one_face_are_open():
-    assert not len(open_edges(*mesh(SOUP)))
-    found = open_edges(*mesh((BOX, QUADS[:5])))
-    assert found.shape == (4, 2, 3)
-    assert (found[..., 2] == 1.0).all()
+    assert np.isinf(open_edge_distance(*mesh(SOUP), (0.0, 0.0, 2.0)))
+    open_box = mesh((BOX, QUADS[:5]))
+    assert open_edge_distance(*open_box, (0.25, 0.0, 1.0)) == 0.75
+    assert open_edge_distance(*open_box, (4.0, 5.0, 1.0)) == 5.0
