@@ -82,14 +82,11 @@ def touch_all_over(
     most: int = MOST,
     rng: np.random.Generator | int | None = None,
     earlier: Sequence[Exploration] = (),
-    compare: Callable[[Mesh], Generator[float, None, Sequence[PointNormal]]] | None = None,
 ) -> Steps:
     """Does what `explore_object` does in steps: yields a Progress after each, and returns the Atlas.
 
     earlier : touches of the same surface that were found before, from which these go on in place of the
         point; they count as touches
-    compare : steps, given the mesh of the joined surface, that return contacts where that is too far off the
-        object; touches go on there
 
     If it is sent anything false other than None, it stops touching and joins the patches so far. Arguments
     and errors are those of `explore_object`; errors are raised in the first step.
@@ -104,7 +101,6 @@ def touch_all_over(
         raise ValueError(f"tolerance: expected the noise {noise:g} or more, got {tolerance:g}")
     options = ExplorationOptions(noise=noise, rng=generator, largest_std=SIZE * tolerance)
     run = _Run(surface, tolerance, most, options)
-    run.compare = compare
     if earlier:
         yield from run.taking_up(earlier)
     if not run.found:
@@ -135,8 +131,6 @@ class _Run:
         self.surface, self.tolerance, self.most, self.options = surface, tolerance, most, options
         self.found: list[Exploration] = []
         self.done, self.is_stopped = 0, False
-
-    compare: Callable[[Mesh], Generator[float, None, Sequence[PointNormal]]] | None = None
 
     def show(self, progress: Progress) -> Generator[Progress, object, None]:
         """Yields a Progress. An answer that is false stops the touches, except None."""
@@ -311,7 +305,7 @@ class _Run:
         """The atlas of what was found so far, and contacts where something is missing or less certain.
 
         These are where the joined surface ends though the object goes on, where a finger from outside meets
-        something else, where `compare` finds it too far off, and where it is less certain than the tolerance.
+        something else, and where the surface is less certain than the tolerance.
         """
         charts = yield from part_of(self.joining(earlier), 0.0, JOINED)
         charts = yield from part_of(blend_heights(charts), 0.0, JOINED)
@@ -338,8 +332,6 @@ class _Run:
         atlas = yield from atlas.widened()
         contacts: list[PointNormal] = [contact for _, contact in uncovered]
         contacts += zip(check.points[off], check.normals[off], strict=True)
-        if self.compare is not None:
-            contacts += yield from part_of(self.compare(atlas.reference.mesh), 1.0, 1.0)
         return atlas, contacts + (self.uncertain_contacts(atlas.reference.mesh) if atlas.is_rough else [])
 
     def off(self, points: Array, normals: Array) -> Array:

@@ -32,7 +32,6 @@ Nearest: TypeAlias = Callable[[Point], tuple[Point, float]]
 class BothWays:
     """The deviations of a surface from the mesh that was touched, and back, found step by step.
 
-    vertices : (n, 3), those of the surface
     deviation : (n,), signed distances of the surface from the mesh, positive outside it: of each vertex, or
         of a place on a face around it that is farther off, as both ends of a long edge may be on the mesh
     mean : the mean distance of the surface from the mesh and of the mesh from the surface, by area
@@ -46,12 +45,10 @@ class BothWays:
     def __init__(self, target: DetachedMesh, mesh: core.Mesh, tolerance: float) -> None:
         """`target` is the DetachedMesh that was touched, and `mesh` the core.Mesh of what was felt."""
         self._target, self._mesh, self._tolerance = target, mesh, tolerance
-        self.vertices = mesh.vertices
         self.deviation = np.zeros(len(mesh.vertices))
         self.mean, self.within, self.felt = 0.0, 1.0, 1.0
         self.largest, self.place = 0.0, mesh.vertices[0]
         self._trees: list[BVHTree] = []  # of the surface
-        self._noted: list[tuple[float, Array]] = []  # The farthest places that were found, with distances.
         self._apart = 0.0  # How far places are apart, about.
 
     def steps(self) -> Iterator[float]:
@@ -188,19 +185,8 @@ class BothWays:
 
     def _note(self, points: Array, off: Array) -> None:
         """Keeps the largest of the distances (n,) of points (n, 3)."""
-        if len(off):
-            farthest = int(np.argmax(off))
-            self._noted.append((float(off[farthest]), points[farthest]))
-            if off[farthest] > self.largest:
-                self.largest, self.place = self._noted[-1]
-
-    def far_places(self, length: float) -> list[Array]:
-        """Places (3,) that are farther off than a length, the farthest first, and so far apart."""
-        found: list[Array] = []
-        for off, place in sorted(self._noted, key=lambda noted: -noted[0]):
-            if off > length and all(np.linalg.norm(place - other) > length for other in found):
-                found.append(place)
-        return found
+        if len(off) and off.max() > self.largest:
+            self.largest, self.place = float(off.max()), points[np.argmax(off)]
 
 
 def _directions() -> Array:

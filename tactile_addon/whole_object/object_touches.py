@@ -137,16 +137,6 @@ class ObjectTouches:
                 break
         yield from self.meshing(JOINED)
 
-    def _compare(self, mesh: core.Mesh) -> Generator[float, None, list[tuple[Any, Any]]]:
-        """Compares a mesh of the surface with the object; returns contacts where it is too far off."""
-        self.compared = BothWays(self.surface, mesh, self.tolerance)
-        yield from self.compared.steps()
-        found = []
-        for place in self.compared.far_places(OFF_TOLERANCES * self.tolerance):
-            with suppress(ValueError):  # The face has no area.
-                found.append(self.surface.project(place.tolist())[:2])
-        return found
-
     def _started(self) -> tuple[Generator[core.Progress, bool | None, core.Atlas], core.Progress]:
         """The steps of core, and the Progress of the first. Raises ValueError if touches cannot begin."""
         why: Exception | str = "no face has an area"
@@ -161,7 +151,6 @@ class ObjectTouches:
                 most=self.most - self._in_vain,
                 rng=self.seed,
                 earlier=self._earlier,
-                compare=self._compare,
             )
             try:
                 state = next(steps)
@@ -245,12 +234,10 @@ class ObjectTouches:
             self.share = start + (1.0 - start) * 0.6 * share
             yield
         self.words = "Comparing"
-        if (
-            self.compared.vertices is not self.whole.mesh.vertices
-        ):  # Else it was compared while it was touched.
-            for share in self._compare(self.whole.mesh):
-                self.share = start + (1.0 - start) * (0.6 + 0.4 * share)
-                yield
+        self.compared = BothWays(self.surface, self.whole.mesh, self.tolerance)
+        for share in self.compared.steps():
+            self.share = start + (1.0 - start) * (0.6 + 0.4 * share)
+            yield
         self.whole.deviation = self.compared.deviation
 
     def again(self, edge: float) -> "ObjectTouches":

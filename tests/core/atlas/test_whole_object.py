@@ -362,26 +362,6 @@ def test_touches_go_on_from_earlier_ones_also_to_a_smaller_tolerance(tolerance):
     assert len(kept) == (len(few) if tolerance == 1.6e-2 else 0)  # The others are less certain.
 
 
-def test_touches_go_on_where_a_comparison_asks_for_it():
-    def touched(compare):
-        given = {"tolerance": 1.6e-2, "noise": 1e-3, "rng": 0, "compare": compare}
-        return ended(core.touch_all_over(RING, RING.start, RING.outward, **given))
-
-    def compare(mesh):
-        compared.append(mesh)
-        yield 1.0
-        return [(RING.start, RING.outward)] if len(compared) == 1 else []
-
-    compared = []
-    found, atlas = touched(compare)
-    assert atlas.status == "ok"
-    assert compared[-1].vertices is atlas.reference.mesh.vertices
-    assert len(compared) == 2
-    before, _ = touched(None)
-    assert len(found) == len(before) + 1
-    assert np.linalg.norm(found[-1].result.point - RING.start) < 1e-2
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
