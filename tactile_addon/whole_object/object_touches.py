@@ -27,8 +27,9 @@ TOLERANCE_SHARES = {"quick": 1.0 / 200.0, "normal": 1.0 / 500.0, "fine": 1.0 / 1
 LARGEST_TOLERANCE, LARGEST_EDGE = 0.1, 0.5  # With more, neither patches nor triangles would fit.
 STARTS = 20  # The number of places to begin that are tried, besides the one that is given.
 # A place is tried first if it has this share of the size of room, and is taken if its patch has a mean radius
-# of so many tolerances: touches would not go on from a smaller one.
-ROOM, GOOD_START, HAIR = 0.05, 5.0, 1e-5
+# of so many tolerances: touches would not go on from a smaller one. The best of so many tries is taken else.
+ROOM, GOOD_START, TRIES = 0.05, 5.0, 4
+HAIR = 1e-5  # Rays begin this share of the size away from a place.
 PLACES, SEED = 1000, 0  # The progress is the share of this many places on the mesh that patches cover.
 # Of all that is to be done, touching and joining are done at these shares; of touching and joining again,
 # touching is done at the last one.
@@ -158,7 +159,7 @@ class ObjectTouches:
                 why = error
                 continue
             begun.append((max(map(np.mean, state.rims)), steps, state))
-            if begun[-1][0] >= GOOD_START * self.tolerance:
+            if begun[-1][0] >= GOOD_START * self.tolerance or len(begun) == TRIES:
                 break
         if not begun:
             raise ValueError(f"Touching could not begin: choose another location or tolerance ({why})")
