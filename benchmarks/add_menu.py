@@ -96,7 +96,7 @@ def touched(add):
 
 
 def expected(addon, add):
-    """How many touches the dialog expects of the object that a function adds, and seconds."""
+    """How many touches the dialog expects of the object that a function adds, seconds, and shares."""
     import bpy
 
     add()
@@ -191,7 +191,7 @@ def main():
         bpy.ops.wm.read_homefile(use_empty=True)
         if options.expected:
             found = ((name, *expected(addon, add)) for name, add in shapes().items())
-            rows = [[name, f"{touches}", f"{seconds:.0f}"] for name, touches, seconds in found]
+            rows = [[name, f"{touches}", f"{seconds:.0f}"] for name, touches, seconds, *_ in found]
     if options.expected:
         table(["object", "touches expected", "seconds expected"], rows)
         return

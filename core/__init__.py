@@ -47,6 +47,7 @@ from .reconstruction.options import METHODS
 from .reconstruction.result import Reconstruction
 from .reconstruction.serialization import from_dict, to_dict
 from .reconstruction.status import CONTRADICTING, DOUBTFUL_STD
+from .scan.face_orientation import DOUBLED, INWARD, open_edge_distance, orientation_fault
 from .scan.facets import is_beside_bend, with_facets
 from .scan.pose_search import Pose, register
 from .scan.sampling import scattered, spaced, spaced_count
@@ -57,9 +58,11 @@ __version__ = "0.1.0"  # That of blender_manifest.toml; python -m tools.release 
 __all__ = [
     "CONTRADICTING",
     "CREASE",
+    "DOUBLED",
     "DOUBTFUL_STD",
     "EXTENT",
     "FINER",
+    "INWARD",
     "METHODS",
     "NOT_MONGE",
     "NO_CONTACT",
@@ -111,6 +114,8 @@ __all__ = [
     "is_beside_bend",
     "mean_height_stds",
     "mesh_error",
+    "open_edge_distance",
+    "orientation_fault",
     "overlapped",
     "reachable",
     "reconstruct",

@@ -151,7 +151,14 @@ REASONS = {
     ),
     "unfelt": Reason("Nothing was felt beyond {0} where the object may go on", ("touch there",)),
     # A whole object that was touched.
-    "stopped": Reason("Touching was stopped, and the object goes on at {0}", ("touch it again",)),
+    "stopped": Reason(
+        "Touching ended when {0} of the object was felt, and the rest is up to {1} away",
+        ("continue with more touches",),
+    ),
+    "out_of_reach": Reason(
+        "{0} of the object was felt, and touches found no patch beyond, up to {1} away",
+        ("continue with a smaller tolerance",),
+    ),
     "cut_short": Reason("The patches end at {0} where the object goes on", (TOUCHES, COARSER)),
     "goes_on": Reason(
         "The patches end at {0} where the object goes on, and touches found no patch there", (FINER,)
@@ -170,8 +177,20 @@ REASONS = {
     ),
     "holes": Reason("Triangles of this edge length leave holes", (SHORTER_EDGES,)),
     "open_edges": Reason(
-        "The surface is up to {0} off the object, whose mesh has open edges, as around holes",
-        ("close them", FINER),
+        "The surface is up to {0} off the object beside an open edge of its mesh, as around a hole",
+        ("close it", FINER),
+    ),
+    "narrow": Reason(
+        "The surface is up to {0} off the object where a wall or gap is {1} wide",
+        ("touch such parts as objects of their own", "fill the gap"),
+    ),
+    "hidden": Reason(
+        "The surface is up to {0} off the object where its own parts nearly hide it",
+        ("delete what is inside", "touch it as an object of its own"),
+    ),
+    "single_facets": Reason(
+        "The surface is up to {0} off the object where touches follow single facets",
+        ("add a Subdivision modifier", FINER),
     ),
     "off_mesh": Reason(
         "The surface is up to {0} off the object, which the tolerance does not explain",

@@ -10,7 +10,7 @@ import bpy
 from . import command_line
 from .comparison import register_operator, verify_operator
 from .files import contact_operators, export_operators
-from .probes import change_handlers, operators, probe, probe_operators
+from .probes import change_handlers, in_slices, operators, probe, probe_operators
 from .report import report_operator
 from .scene import shown
 from .sidebar import dots, panel, preferences, rows
@@ -20,6 +20,7 @@ from .whole_object import kept, object_operator, surface_operators
 
 CLASSES = (
     operators.TACTILE_OT_reconstruct,
+    in_slices.TACTILE_OT_stop,
     verify_operator.TACTILE_OT_verify,
     register_operator.TACTILE_OT_register,
     map_operator.TACTILE_OT_stability_map,

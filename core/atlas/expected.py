@@ -38,8 +38,8 @@ def expected_touches(
     tolerance: float,
     noise: float = 0.0,
     rng: np.random.Generator | int | None = None,
-) -> tuple[float, int]:
-    """About how many touches `explore_object` makes of an object, and how many were made to find that out.
+) -> tuple[float, int, list[Reconstruction]]:
+    """About how many touches `explore_object` makes of an object; how many show that; the patches of these.
 
     points, outward : (n, 3), hundreds of places spread evenly over the object, in random order, and the
         outward directions there
@@ -54,7 +54,8 @@ def expected_touches(
         farthest=FIRST_EXTENT * tolerance, largest_std=SIZE * tolerance, noise=noise, rng=generator_of(rng)
     )
     left, tried = np.arange(len(p)), 0
-    areas: list[float] = []  # Of the patches at places that none before covers.
+    areas: list[float] = []  # Of the patches at places that none before covers,
+    patches: list[Reconstruction] = []  # and these.
     for _ in range(ROUNDS):
         places, left = left[:AT_ONCE], left[AT_ONCE:]
         tried += len(places)
@@ -66,13 +67,14 @@ def expected_touches(
             rim = _rim(surface, e, up[place], tolerance)
             if rim.any():
                 areas.append(float(np.pi * np.mean(rim**2)))
+                patches.append(e.result)
                 faces_it = up @ e.result.frame.axes[:, 2] > FACING
                 covered[faces_it] |= covered_by(e.result, rim, p[faces_it], tolerance)
         left = left[~covered[left]]
     if not areas:
         raise ValueError("points: expected some where a patch can be felt, got none")
     more = OVERLAP * area * len(left) / len(p) * float(np.mean(1.0 / np.array(areas[-LATER:])))
-    return len(areas) + more, tried
+    return len(areas) + more, tried, patches
 
 
 def thinnest_wall(surface: Surface, points: ArrayLike, outward: ArrayLike, size: float) -> float:

@@ -81,8 +81,12 @@ def touch_all_over(
     noise: float = 0.0,
     most: int = MOST,
     rng: np.random.Generator | int | None = None,
+    earlier: Sequence[Exploration] = (),
 ) -> Steps:
     """Does what `explore_object` does in steps: yields a Progress after each, and returns the Atlas.
+
+    earlier : touches of the same surface that were found before, from which these go on in place of the
+        point; they count as touches
 
     If it is sent anything false other than None, it stops touching and joins the patches so far. Arguments
     and errors are those of `explore_object`; errors are raised in the first step.
@@ -97,7 +101,10 @@ def touch_all_over(
         raise ValueError(f"tolerance: expected the noise {noise:g} or more, got {tolerance:g}")
     options = ExplorationOptions(noise=noise, rng=generator, largest_std=SIZE * tolerance)
     run = _Run(surface, tolerance, most, options)
-    yield from run.show(run.first(p, up))
+    if earlier:
+        yield from run.taking_up(earlier)
+    if not run.found:
+        yield from run.show(run.first(p, up))
     yield from _all_over(run)
     return (yield from _joined_and_refined(run))
 
@@ -159,17 +166,32 @@ class _Run:
         if not felt:
             raise errors[0]
         first, at, outward = max(felt, key=lambda each: each[0].result.radius)
-        self.frontier = Frontier(
-            finger_at(self.surface, at, outward, first.step),
+        self.frontier = self._frontier(at, outward, first.step)
+        if not self.frontier.add(first.result):
+            raise ValueError("point: expected a surface within three tolerances of the first patch, got none")
+        self.found, self.done = [first], self.done + 1
+        return self.now(new=[first])
+
+    def _frontier(self, at: Vector, outward: Vector, step: float) -> Frontier:
+        """A frontier without patches, for a finger on the outer side of the surface at a point."""
+        return Frontier(
+            finger_at(self.surface, at, outward, step),
             NEAR * self.tolerance,
             np.pi * (SMALL * self.tolerance) ** 2,
             self.options.noise,
             generator_of(self.options.rng),
         )
-        if not self.frontier.add(first.result):
-            raise ValueError("point: expected a surface within three tolerances of the first patch, got none")
-        self.found, self.done = [first], 1
-        return self.now(new=[first])
+
+    def taking_up(self, earlier: Sequence[Exploration]) -> Generator[Progress, object, None]:
+        """Takes in touches that were found before, unless they are less certain than is asked for now."""
+        frame, step = earlier[0].result.frame, earlier[0].step
+        self.frontier = self._frontier(vector_of(frame.origin), vector_of(frame.axes[:, 2]), step)
+        self.done = len(earlier)
+        for e in earlier:
+            is_sure = e.result.mean_height_std <= SIZE * self.tolerance
+            if is_sure and self.frontier.add(e.result, NARROW * self.tolerance, SMALL * self.tolerance):
+                self.found.append(e)
+                yield from self.show(self.now(new=[e]))
 
     def _places(self, point: Vector, up: Vector) -> Iterator[tuple[Vector, Vector]]:
         """The point and its outward direction, then contacts of a finger that comes down near it."""

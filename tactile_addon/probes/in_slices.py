@@ -12,6 +12,7 @@ from bpy.props import BoolProperty
 
 from ..touch.settings import TARGET, UNSAVED
 from ..touch.types import OperatorMixin, Outcome
+from ..touch.units import duration
 from ..touch.wording import sentence
 from .operators import report_error, target_object, waiting
 
@@ -19,6 +20,7 @@ from .operators import report_error, target_object, waiting
 FIRST_SLICE = 0.2  # Work that takes no longer is done without slices.
 TIMER_SLICE, LONGEST_SLICE = 0.03, 0.25  # The least and longest work between two events: as a redraw takes.
 NEXT = 0.01  # The next slice begins after this time.
+LITTLE = 0.05  # The time that is left is said from this share on.
 SAY = 1.0  # Without a window, a line of progress is printed each time.
 Progress: TypeAlias = tuple[str, float | None]  # Words, and the share that is done, if it is known.
 
@@ -43,7 +45,8 @@ class InSlices(OperatorMixin):
     _done: Callable[[], Progress]
     _finish: Callable[[bpy.types.Context], Outcome]
     _timer: bpy.types.Timer | None = None  # There is one while it runs in a window.
-    _worked = 0.0  # When the last slice ended.
+    _begun = _worked = 0.0  # When the first slice began, and when the last one ended.
+    _is_asked = False  # Whether the panel's button was pressed, which does what Esc does.
     _in_window = False  # Whether a dialog was confirmed, after which it goes on in slices.
     stop = "Stop"  # What Esc does,
     stopped = "Stopped: the patch stays as it was"  # and what is reported then.
@@ -84,19 +87,23 @@ class InSlices(OperatorMixin):
 
     def _go_on(self, context: bpy.types.Context) -> Outcome:
         """Starts a timer in the window, whose events do the rest of the steps in `modal`."""
+        _running.append(self)
+        self._begun = perf_counter()
         self._timer = context.window_manager.event_timer_add(NEXT, window=context.window)
-        context.workspace.status_text_set(_status(self.stop, *self._done()))
+        context.workspace.status_text_set(_status(self.stop, *self._said()))
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
-        if event.type == "ESC" and event.value == "PRESS":
+        if self._is_asked or (event.type == "ESC" and event.value == "PRESS"):
+            self._is_asked = False
             return self._stopped(context)
         if event.type != "TIMER":
             return self.meanwhile
         try:
             if not self._advance(context, self._slice()):
-                context.workspace.status_text_set(_status(self.stop, *self._done()))
+                context.workspace.status_text_set(_status(self.stop, *self._said()))
+                redraw_sidebars(context)
                 return self.meanwhile
             self._leave(context)
             return self._finish(context)
@@ -123,6 +130,14 @@ class InSlices(OperatorMixin):
     def _check(self, context: bpy.types.Context) -> None:
         """Accepts whatever happens meanwhile, unless an operator overrides it."""
 
+    def _said(self) -> Progress:
+        """What `_done` gives, and the time that is left, once a little is done."""
+        words, share = self._done()
+        if share is None or share < LITTLE:
+            return words, share
+        left = (perf_counter() - self._begun) * (1.0 / share - 1.0)
+        return f"{words}, {duration(left)} left", share
+
     def _stopped(self, context: bpy.types.Context) -> Outcome:
         self._leave(context)
         self.report({"INFO"}, self.stopped)
@@ -131,6 +146,8 @@ class InSlices(OperatorMixin):
     def _leave(self, context: bpy.types.Context) -> None:
         """Removes everything that shows that it is going on."""
         if self._timer is not None:
+            _running.remove(self)
+            redraw_sidebars(context)
             context.window_manager.event_timer_remove(self._timer)
             context.workspace.status_text_set(None)
             self._timer = None
@@ -140,6 +157,37 @@ class InSlices(OperatorMixin):
         if self._timer is not None:
             self._leave(context)
             print(f"{self.bl_label}: stopped because the file or the window was closed", file=sys.stderr)
+
+
+_running: list[InSlices] = []  # What runs in a window now, the latest last.
+
+
+class TACTILE_OT_stop(bpy.types.Operator):
+    """Do what Esc does while an object is touched"""
+
+    bl_idname = "tactile.stop"
+    bl_label = "Stop"
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        for operator in _running[-1:]:
+            operator._is_asked = True
+        return {"FINISHED"}
+
+
+def draw_running(layout: bpy.types.UILayout) -> None:
+    """Draws how far the latest operator is that runs in slices, and a button that stops it; or nothing."""
+    for operator in _running[-1:]:
+        words, share = operator._said()
+        layout.progress(factor=share or 0.0, text=words, translate=False)
+        layout.operator(TACTILE_OT_stop.bl_idname, text=operator.stop, icon="CANCEL")
+
+
+def redraw_sidebars(context: bpy.types.Context) -> None:
+    """Has the sidebars of all viewports in the window drawn again; there is none while that is closed."""
+    for area in context.window.screen.areas if context.window else ():
+        for region in area.regions if area.type == "VIEW_3D" else ():
+            if region.type == "UI":
+                region.tag_redraw()
 
 
 class AllOver(InSlices):

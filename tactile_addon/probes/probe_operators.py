@@ -12,7 +12,7 @@ from bpy.props import IntProperty, StringProperty
 from ..scene import patch_object, patch_record
 from ..scene.viewports import show_colors, shows_colors
 from ..touch import units
-from ..touch.settings import MOST_PLANES, length_property, silent
+from ..touch.settings import MOST_PLANES, TARGET, length_property, silent
 from ..touch.types import Object, OperatorMixin, Outcome
 from ..touch.wording import added_planes, verdict
 from . import probe, touch_again
@@ -24,6 +24,7 @@ from .operators import (
     report_done,
     report_error,
     surface_of,
+    target_object,
     waiting,
 )
 
@@ -165,24 +166,32 @@ class TACTILE_OT_add_subdivision(_ProbeOperator, bpy.types.Operator):
     bl_idname = "tactile.add_subdivision"
     bl_label = "Add Subdivision"
 
+    target: TARGET
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if surface_of(context) is None:
+        active = context.view_layer.objects.active
+        if probe.probe_of(active) is not None:
             return super().poll(context)
-        return is_in_object_mode(cls, context, "Modifiers are added")
+        is_mesh = active is not None and active.type == "MESH"
+        hint = "Select the mesh object to subdivide, or what was felt of it"
+        return polls(cls, is_mesh, hint) and is_in_object_mode(cls, context, "Modifiers are added")
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         found, surface = probe.probe_of(context.view_layer.objects.active), surface_of(context)
-        if surface is None:
-            target = found.tactile_probe.target
-        else:
-            target = bpy.data.objects.get(surface[patch_record.ATLAS_RECORD]["source"])
-        if target is None or not target.is_editable:
+        try:
+            target = target_object(context, self.target)
+        except ValueError as error:
+            return report_error(self, error)
+        if not target.is_editable or target.type != "MESH":
             return report_error(self, ValueError("The target cannot be changed: make it local first"))
         _subdivide(target)
         context.view_layer.update()
         if surface is not None:
+            patch_record.mark_subdivided(surface)
             return report_done(self, f'"{target.name}" is subdivided: touch it all over again')
+        if found is None or self.target:
+            return {"FINISHED"}
         touch_again.refresh(found, context)
         if found.tactile_probe.message:
             return report_error(self, ValueError(found.tactile_probe.message))

@@ -117,6 +117,12 @@ def mark_outdated(patch: Object, message: str) -> None:
     report.update({"status": "outdated", "message": message})
 
 
+def mark_subdivided(surface: Object) -> None:
+    """Gives the record of a whole object that was subdivided the status "outdated": its facets are gone."""
+    message = "The object was subdivided since it was touched: touch it all over again."
+    surface[ATLAS_RECORD].update({"status": "outdated", "message": message, "faceted": 0.0})
+
+
 def mark_current(patch: Object) -> None:
     """Puts the verdict of the record back, because the patch is that of its probe's inputs again."""
     verdict = patch.pop(VERDICT, None)

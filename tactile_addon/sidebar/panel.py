@@ -13,6 +13,7 @@ from ..comparison.verification_wording import verification_rows, verification_ta
 from ..comparison.verify_operator import TACTILE_OT_verify
 from ..files.export_operators import TACTILE_OT_export_table
 from ..probes import probe
+from ..probes.in_slices import draw_running
 from ..probes.operators import NO_MESH
 from ..probes.probe_operators import (
     TACTILE_OT_activate,
@@ -39,7 +40,11 @@ from ..touch.wording import reasons, registration_summary, verdict
 from ..viewport.pick import TACTILE_OT_pick
 from ..whole_object.object_operator import TACTILE_OT_touch_all_over
 from ..whole_object.object_report import deviation, facets, is_all_within, object_rows, object_verdict
-from ..whole_object.surface_operators import TACTILE_OT_look_farthest, TACTILE_OT_mesh_again
+from ..whole_object.surface_operators import (
+    TACTILE_OT_continue_touching,
+    TACTILE_OT_look_farthest,
+    TACTILE_OT_mesh_again,
+)
 from .dots import dot
 from .patch_rows import found_values, main_rows, other_rows, plane_rows
 from .rows import draw_rows, draw_sentence
@@ -178,6 +183,7 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
 
     def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
         layout.operator(TACTILE_OT_touch_all_over.bl_idname, icon="MESH_UVSPHERE")
+        draw_running(layout)
         if obj is None or patch_record.ATLAS_RECORD not in obj:
             return
         record = obj[patch_record.ATLAS_RECORD]
@@ -187,6 +193,8 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         if words := facets(record):
             draw_sentence(context, layout, words, "INFO")
             layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
+        if record.get("uncovered") and record["status"] != "outdated":
+            layout.operator(TACTILE_OT_continue_touching.bl_idname, icon="PLAY")
         _draw_colors(context, layout, obj, "tactile_colors")
         if "touches" in record:  # Measured contacts have no mesh to touch.
             text = f"Largest {'Gap' if record['uncovered'] else 'Deviation'}: {deviation(record, 'max')}"

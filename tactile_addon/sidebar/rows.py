@@ -44,7 +44,7 @@ TIPS = {
     "Largest Deviation": "Largest distance of a vertex of the patch from the mesh, as the colors show it",
     "Touches": "Number of touches that the object took",
     "Surface": "Closed: felt all round; Open: the object ends there; Incomplete: touches could go on",
-    "Goes On At": "Number of places where nothing was felt yet, although the object goes on there",
+    "Felt": "Share of the object's area that the surface is within the tolerance of",
     "Tolerance": "Standard deviation to reach for the height of each patch",
     "Deviation": "Mean distance from the mesh, that of a patch in height; – if no mesh is below",
     "Edge Length": "Typical length of the surface's edges, at most about a quarter of the thinnest wall",

@@ -12,8 +12,10 @@ import numpy as np
 from mathutils import Matrix
 from mathutils.bvhtree import BVHTree
 
+from ... import core
 from .arrays import read_array
 from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, require_in_scene
+from .oriented import require_oriented
 from .types import Array, Object, Point, Triple
 
 PAUSE = 50.0  # The time until the shape is compared again, as a multiple of the time that this takes.
@@ -40,6 +42,7 @@ class DetachedMesh(PlacedMesh):
         """Raises ValueError, with a sentence, if `obj` cannot be touched."""
         evaluated, linear, _ = evaluated_object(obj, depsgraph)
         co = coordinates(evaluated)
+        require_oriented(evaluated, co)
         # It keeps no reference to the object, which somebody may delete.
         self.name, self._uid = obj.name, obj.session_uid
         self._checksum, self.matrix = zlib.crc32(co.data), obj.matrix_world.copy()
@@ -99,13 +102,9 @@ class DetachedMesh(PlacedMesh):
         self._compared_until = 0.0
         return self.require_source(context)
 
-    def has_rims(self) -> bool:
-        """Whether edges have one face only, as around holes. Vertices in one place count as one."""
-        _, same = np.unique(self.points, axis=0, return_inverse=True)
-        ends = np.sort(same.ravel()[self.triangles[:, [[0, 1], [1, 2], [2, 0]]]].reshape(-1, 2), axis=1)
-        ends = ends[ends[:, 0] < ends[:, 1]]
-        _, faces = np.unique(ends, axis=0, return_counts=True)
-        return bool((faces == 1).any())
+    def open_edge_distance(self, place: Array) -> float:
+        """How far a place is from the nearest edge that has one face only, as around a hole."""
+        return core.open_edge_distance(self.points, self._corners, self._starts[:-1], place)
 
     @property
     def origin(self) -> Array:
@@ -132,6 +131,11 @@ class DetachedMesh(PlacedMesh):
         """The corners (k, 3) of a face, in order."""
         start, end = self._starts[number : number + 2]
         return self.points[self._corners[start:end]]
+
+    def is_of_facets(self, r: core.Reconstruction) -> bool:
+        """Whether the curvature of a touch is that of facets, before anything else that is in doubt."""
+        gravest = core.with_facets(r, self.face_near, self.corners_of).gravest
+        return gravest is not None and gravest.code == "facets"
 
 
 def _tree_in_world(mesh: bpy.types.Mesh, linear: Array) -> BVHTree:

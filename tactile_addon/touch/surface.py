@@ -11,6 +11,7 @@ import numpy as np
 
 from .arrays import read_array
 from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, size_of
+from .oriented import require_oriented
 from .types import Array, Object, Point, Triple
 
 MANY = 8  # This multiple of the vertices that are needed is looked at first, before all are.
@@ -22,7 +23,8 @@ SMOOTH = 0.77  # The cosine between the normals of a vertex and of each of its f
 class MeshSurface(PlacedMesh):
     """The evaluated mesh of an object, which core.track touches through `ray_cast`.
 
-    sound : whether all its vertices are known to be at finite places, which takes time to check
+    sound : whether all its vertices are known to be at finite places, and its faces to point outward, which
+        takes time to check
     name : of the object; size : the longest edge of its bounding box, in the world
     """
 
@@ -32,6 +34,7 @@ class MeshSurface(PlacedMesh):
             evaluated, linear, origin = evaluated_object(obj, depsgraph)
             if not sound:
                 self._co = coordinates(evaluated)
+                require_oriented(evaluated, self._co)
             evaluated.ray_cast((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), distance=1e-30, depsgraph=depsgraph)
         except RuntimeError as error:
             raise disabled(obj) from error

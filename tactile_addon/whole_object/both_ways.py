@@ -36,6 +36,7 @@ class BothWays:
         of a place on a face around it that is farther off, as both ends of a long edge may be on the mesh
     mean : the mean distance of the surface from the mesh and of the mesh from the surface, by area
     within : the smaller share of both areas, of surface and mesh, that is within the tolerance of the other
+    felt : the share of the mesh's area that is
     largest, place : the largest distance of either from the other, and where that is, (3,)
 
     Places of the mesh that no finger could reach, because the mesh hides them, do not count.
@@ -45,7 +46,8 @@ class BothWays:
         """`target` is the DetachedMesh that was touched, and `mesh` the core.Mesh of what was felt."""
         self._target, self._mesh, self._tolerance = target, mesh, tolerance
         self.deviation = np.zeros(len(mesh.vertices))
-        self.mean, self.within, self.largest, self.place = 0.0, 1.0, 0.0, mesh.vertices[0]
+        self.mean, self.within, self.felt = 0.0, 1.0, 1.0
+        self.largest, self.place = 0.0, mesh.vertices[0]
         self._trees: list[BVHTree] = []  # of the surface
         self._apart = 0.0  # How far places are apart, about.
 
@@ -73,8 +75,8 @@ class BothWays:
         yield from part_of(self._climb(felt, back, self._to_mesh, self._to_seen), 0.8, 1.0)
         back = back if len(back) else np.zeros(1)
         self.mean = 0.5 * float(np.average(there, weights=areas) + back.mean())
-        near = np.average(there <= self._tolerance, weights=areas), (back <= self._tolerance).mean()
-        self.within = float(min(near))
+        self.felt = float((back <= self._tolerance).mean())
+        self.within = min(float(np.average(there <= self._tolerance, weights=areas)), self.felt)
 
     def _off_target(self, points: Array, normals: Array, off: Array) -> Generator[float, None, None]:
         """Fills in the signed distances (n,) of points (n, 3) of the surface; yields the share done."""

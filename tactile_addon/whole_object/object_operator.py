@@ -8,7 +8,7 @@ import bpy
 from bpy.props import EnumProperty, FloatVectorProperty, IntProperty
 
 from ..probes import probe
-from ..probes.in_slices import AllOver, Progress
+from ..probes.in_slices import AllOver, InSlices, Progress
 from ..probes.operators import (
     has_target,
     is_in_object_mode,
@@ -16,6 +16,7 @@ from ..probes.operators import (
     report_done,
     target_object,
 )
+from ..probes.probe_operators import TACTILE_OT_add_subdivision
 from ..scene import patch_record
 from ..touch.settings import NOISE, UNSAVED, draw_chosen, given, length_property
 from ..touch.types import Outcome
@@ -36,7 +37,52 @@ ACCURACIES = [
 ]
 
 
-class TACTILE_OT_touch_all_over(AllOver, bpy.types.Operator):
+class Growing(InSlices):
+    """For operators that touch an object all over, with `_touches`: patches appear, and Esc keeps them."""
+
+    stop = "Stop Touching and Keep"
+    stopped = "Stopped: no surface was kept"
+    _touches: ObjectTouches
+    _growing: whole_mesh.GrowingPatches | None = None
+    _is_ending = False  # Esc was pressed once.
+
+    def _go_on(self, context: bpy.types.Context) -> Outcome:
+        self._growing = whole_mesh.GrowingPatches(context.scene, self._touches.surface)
+        return super()._go_on(context)
+
+    def _shown(self) -> Iterator[None]:
+        """The steps of the touches. In a window, patches appear between them."""
+        shown = 0
+        for _ in self._touches.steps():
+            if self._growing is not None:
+                self._growing.add(self._touches.found[shown:], self._touches.rims[shown:])
+            shown = len(self._touches.found)
+            yield
+
+    def _done(self) -> Progress:
+        share = self._touches.share
+        return f"{self._touches.words}: {share:.0%}", share
+
+    def _check(self, context: bpy.types.Context) -> None:
+        self._touches.surface.require_source(context)
+
+    def _stopped(self, context: bpy.types.Context) -> Outcome:
+        """Has the patches so far joined. If Esc is pressed again, nothing is kept."""
+        if self._is_ending or not self._touches.found:
+            return super()._stopped(context)
+        self._is_ending, self.stop = True, "Discard the Surface"
+        if not self._touches.is_stopped:  # It may be meshing already.
+            self._touches.stop()
+        return {"RUNNING_MODAL"}
+
+    def _leave(self, context: bpy.types.Context) -> None:
+        super()._leave(context)
+        if self._growing is not None:
+            self._growing.remove()
+            self._growing = None
+
+
+class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
     """Touch an object all over, from one point on, and join the patches to one surface"""
 
     bl_idname = "tactile.touch_all_over"
@@ -72,18 +118,11 @@ class TACTILE_OT_touch_all_over(AllOver, bpy.types.Operator):
     )
     edge: EDGE
 
-    stop = "Stop Touching and Keep"
-    stopped = "Stopped: no surface was kept"
-    _growing = _expected = None
-    _is_ending = False  # Esc was pressed once.
+    _expected = None
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return is_in_object_mode(cls, context, "Objects are touched") and has_target(cls, context)
-
-    def _go_on(self, context: bpy.types.Context) -> Outcome:
-        self._growing = whole_mesh.GrowingPatches(context.scene, self._touches.surface)
-        return super()._go_on(context)
 
     def _begin(self, context: bpy.types.Context) -> None:
         target, found = target_object(context, self.target), probe.probe_of(context.view_layer.objects.active)
@@ -100,37 +139,6 @@ class TACTILE_OT_touch_all_over(AllOver, bpy.types.Operator):
             },
         )
         self._steps = self._shown()
-
-    def _shown(self) -> Iterator[None]:
-        """The steps of the touches. In a window, patches appear between them."""
-        shown = 0
-        for _ in self._touches.steps():
-            if self._growing is not None:
-                self._growing.add(self._touches.found[shown:], self._touches.rims[shown:])
-            shown = len(self._touches.found)
-            yield
-
-    def _done(self) -> Progress:
-        share = self._touches.share
-        return f"{self._touches.words}: {share:.0%}", share
-
-    def _check(self, context: bpy.types.Context) -> None:
-        self._touches.surface.require_source(context)
-
-    def _stopped(self, context: bpy.types.Context) -> Outcome:
-        """Has the patches so far joined. If Esc is pressed again, nothing is kept."""
-        if self._is_ending or not self._touches.found:
-            return super()._stopped(context)
-        self._is_ending, self.stop = True, "Discard the Surface"
-        if not self._touches.is_stopped:  # It may be meshing already.
-            self._touches.stop()
-        return {"RUNNING_MODAL"}
-
-    def _leave(self, context: bpy.types.Context) -> None:
-        super()._leave(context)
-        if self._growing is not None:
-            self._growing.remove()
-            self._growing = None
 
     def _finish(self, context: bpy.types.Context) -> Outcome:
         target = self._touches.surface.require_same(context)
@@ -150,6 +158,11 @@ class TACTILE_OT_touch_all_over(AllOver, bpy.types.Operator):
     def draw(self, context: bpy.types.Context) -> None:
         self._draw_target(context)
         layout = self.layout
+        for warning in self._expected.warnings if self._expected else ():
+            layout.label(text=warning, icon="ERROR")
+        if self._expected is not None and self._expected.is_faceted:
+            button = layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
+            button.target = self.target
         row = layout.row()
         row.active = not self.tolerance
         row.prop(self, "accuracy", expand=True)

@@ -50,9 +50,9 @@ def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def verdict_of(record: Mapping[str, Any]) -> str:
-    """The verdict on a whole object in a word: "Good", "Doubtful" or "Incomplete"."""
-    if record["status"] == "ok":
-        return "Good"
+    """The verdict on a whole object in a word: "Good", "Doubtful", "Incomplete" or "Outdated"."""
+    if record["status"] in ("ok", "outdated"):
+        return "Good" if record["status"] == "ok" else "Outdated"
     return "Incomplete" if record.get("uncovered") else "Doubtful"
 
 
@@ -69,9 +69,9 @@ def is_all_within(record: Mapping[str, Any]) -> bool:
 def agreement(record: Mapping[str, Any]) -> str | None:
     """How far surface and mesh agree, and how far they have to for a good verdict; None if that says nothing.
 
-    So it is without a mesh, and where touches could go on.
+    So it is without a mesh, where touches could go on, and if the object has another shape now.
     """
-    if "within" not in record or record["uncovered"]:
+    if "within" not in record or record["uncovered"] or record["status"] == "outdated":
         return None
     unit, tolerance = unit_of(record), record["tolerance"]
     share = within(record["within"], record["deviation_max"] <= tolerance)
@@ -114,7 +114,7 @@ def object_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("Contacts", record.get("contacts")),
         # It is never "Closed" where touches could go on.
         ("Surface", "Closed" if record["is_closed"] else "Incomplete" if record.get("uncovered") else "Open"),
-        ("Goes On At", many(record["uncovered"], "place", "places") if record.get("uncovered") else None),
+        ("Felt", within(record["felt"], False) if record.get("uncovered") else None),
         ("Tolerance", _tolerance(record)),
         ("Height", f"± {units.say(record['height_std'], 1, unit_of(record))}"),
         # Where touches could go on, most of it would be the object that was not felt.
@@ -139,7 +139,7 @@ def _surface(record: Mapping[str, Any]) -> str:
     if record["is_closed"]:
         return "closed all round"
     if record.get("uncovered"):
-        return f"the object goes on at {many(record['uncovered'], 'place', 'places')}"
+        return f"{within(record['felt'], False)} of the object"
     return "open where the object ends" if record["status"] == "ok" else "open where nothing was felt"
 
 

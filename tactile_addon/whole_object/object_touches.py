@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Touches that grow over an object, step by step, with nothing changed in the scene."""
 
+import math
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
@@ -16,15 +17,20 @@ from ..touch.detached_mesh import DetachedMesh
 from ..touch.touch_object import AWAY, nearest_point
 from ..touch.touch_report import verdict_report
 from ..touch.types import Array, Object
-from ..touch.units import length
+from ..touch.units import Unit, length
 from .both_ways import BothWays
+from .farthest_place import why_far
 from .object_report import OFF_TOLERANCES, WITHIN_SHARE, unit_of, within
 from .whole_surface import WholeSurface
 
 # These lengths are shares of the object's size.
 TOLERANCE_SHARES = {"quick": 1.0 / 200.0, "normal": 1.0 / 500.0, "fine": 1.0 / 1250.0}
 LARGEST_TOLERANCE, LARGEST_EDGE = 0.1, 0.5  # With more, neither patches nor triangles would fit.
-STARTS = 20  # The number of places to begin that are tried if none is given.
+STARTS = 20  # The number of places to begin that are tried, besides the one that is given.
+# A place is tried first if it has this share of the size of room, and is taken if its patch has a mean radius
+# of so many tolerances: touches would not go on from a smaller one. The best of so many tries is taken else.
+ROOM, GOOD_START, TRIES = 0.05, 5.0, 4
+HAIR = 1e-5  # Rays begin this share of the size away from a place.
 PLACES, SEED = 1000, 0  # The progress is the share of this many places on the mesh that patches cover.
 # Of all that is to be done, touching and joining are done at these shares; of touching and joining again,
 # touching is done at the last one.
@@ -35,7 +41,7 @@ class ObjectTouches:
     """Touches of an evaluated mesh that begin at one place, in the directions of the world.
 
     surface : the mesh as it was, relative to its object's origin
-    found : core.Reconstructions of the touches so far
+    explored, found : core.Explorations of the touches so far, and their core.Reconstructions
     rims : how far the finger feels each of their patches all round, (AZIMUTHS,), lengths
     done : the number of touches so far, including those that gave no patch
     uncovered : the number of places that are known to be uncovered
@@ -72,18 +78,24 @@ class ObjectTouches:
         self.tolerance = tolerance or tolerance_of(self.surface.size, accuracy, noise)
         self._require_lengths(noise, edge)
         self.noise, self.seed, self.most, self.edge = noise, seed, most, edge
-        self.found: list[core.Reconstruction] = []
-        self.rims: list[Array] = []
-        self.done, self.uncovered = 0, 0
-        self.words, self.share = "Looking for a place to begin", 0.0
-        self.is_stopped = self._is_cut_short = False
-        self._left = self._spread()
-        self._rounds, self._joined, self._is_joining = 0, 0, False  # The joinings, and the touches before.
-        self._area = self._faceted = 0.0
+        self._begin(())
         self._start = None
         if location is not None:
             at = np.subtract(location, self.surface.origin)
             self._start = nearest_point(self.surface, at, AWAY * self.surface.size)
+
+    def _begin(self, earlier: Sequence[core.Exploration]) -> None:
+        """Prepares the `steps` of touches that go on from earlier ones."""
+        self._earlier, self._in_vain = earlier, self.done - len(earlier) if earlier else 0
+        self.explored: list[core.Exploration] = []
+        self.found: list[core.Reconstruction] = []
+        self.rims: list[Array] = []
+        self.done, self.uncovered = 0, 0
+        self.words, self.share = "Looking for a place to begin", 0.0
+        self.is_stopped = False
+        self._left = self._spread()
+        self._rounds, self._joined, self._is_joining = 0, 0, False  # The joinings, and the touches before.
+        self._area = self._faceted = 0.0
 
     def _require_lengths(self, noise: float, edge: float) -> None:
         """Raises ValueError, with a sentence, for lengths that are too large or too small for this object."""
@@ -130,6 +142,7 @@ class ObjectTouches:
     def _started(self) -> tuple[Generator[core.Progress, bool | None, core.Atlas], core.Progress]:
         """The steps of core, and the Progress of the first. Raises ValueError if touches cannot begin."""
         why: Exception | str = "no face has an area"
+        begun: list[tuple[float, Any, core.Progress]] = []
         for point, outward in self._places():
             steps = core.touch_all_over(
                 self.surface,
@@ -137,24 +150,40 @@ class ObjectTouches:
                 outward,
                 tolerance=self.tolerance,
                 noise=self.noise,
-                most=self.most,
+                most=self.most - self._in_vain,
                 rng=self.seed,
+                earlier=self._earlier,
             )
             try:
-                return steps, next(steps)
+                state = next(steps)
             except ValueError as error:
                 why = error
-        raise ValueError(f"Touching could not begin: choose another location or tolerance ({why})")
+                continue
+            begun.append((max(map(np.mean, state.rims)), steps, state))
+            if begun[-1][0] >= GOOD_START * self.tolerance or len(begun) == TRIES:
+                break
+        if not begun:
+            raise ValueError(f"Touching could not begin: choose another location or tolerance ({why})")
+        _, steps, state = max(begun, key=lambda each: each[0])
+        return steps, state
 
-    def _places(self) -> Iterator[tuple[Any, Any]]:
-        """Places where the touches may begin, with their normals."""
-        if self._start is not None:
-            yield self._start
-            return
+    def _places(self) -> list[tuple[Any, Any]]:
+        """Places where the touches may begin, with their normals, those in slits and on ridges last."""
+        found = [] if self._start is None else [self._start]
         faces = np.random.default_rng(self.seed).permutation(self.surface.faces)[:STARTS]
         for middle in self.surface.points[faces].mean(axis=1):  # It is off all edges.
             with suppress(ValueError):  # The face has no area.
-                yield self.surface.project(middle)[:2]
+                found.append(self.surface.project(middle)[:2])
+        return sorted(found, key=lambda place: -min(self._room(*place), ROOM * self.surface.size))
+
+    def _room(self, point: Any, outward: Any) -> float:
+        """How far a place is from the next wall before it, or below it if that is nearer."""
+        size, rooms = self.surface.size, []
+        for way in (np.array(outward), -np.array(outward)):
+            start = point + HAIR * size * way
+            hit = self.surface.ray_cast(start.tolist(), way.tolist(), size)
+            rooms.append(size if hit is None else math.dist(hit[0], start))
+        return min(rooms)
 
     def _spread(self) -> Array:
         """Places all over the mesh, (PLACES, 3), of which patches will cover more and more."""
@@ -166,15 +195,14 @@ class ObjectTouches:
     def _note(self, state: core.Progress) -> None:
         for exploration, rim in zip(state.found, state.rims, strict=True):
             r = exploration.result
+            self.explored.append(exploration)
             self.found.append(r)
             self.rims.append(rim)
             self._area += r.domain.area
-            on_mesh = core.with_facets(r, self.surface.face_near, self.surface.corners_of)
-            is_of_facets = on_mesh.gravest is not None and on_mesh.gravest.code == "facets"
-            self._faceted += r.domain.area * is_of_facets
+            self._faceted += r.domain.area * self.surface.is_of_facets(r)
             self._left = self._left[~core.covered_by(r, rim, self._left, self.tolerance)]
-        self.done, self.uncovered = state.done, state.uncovered
-        touches, places = many(state.done, "touch", "touches"), many(state.uncovered, "place", "places")
+        self.done, self.uncovered = self._in_vain + state.done, state.uncovered
+        touches, places = many(self.done, "touch", "touches"), many(state.uncovered, "place", "places")
         patches = many(len(self.found), "patch", "patches")
         if state.joining is None:
             self._is_joining = False
@@ -222,15 +250,27 @@ class ObjectTouches:
         again.edge, again.share, again.whole = edge, 0.0, WholeSurface(self.whole.atlas, self.surface.origin)
         return again
 
+    def continued(self, tolerance: float, more: int) -> "ObjectTouches":
+        """These touches, whose `steps` go on from where they ended, to a tolerance and by `more` at most.
+
+        Raises ValueError, with a sentence, for a tolerance that does not suit the object.
+        """
+        again = copy(self)
+        again.tolerance, again.most = tolerance, self.done + more
+        again._require_lengths(self.noise, self.edge)
+        again._begin(self.explored)
+        return again
+
     def stop(self) -> None:
         """Makes the steps touch no more, and join the patches so far."""
-        self.is_stopped = self._is_cut_short = True
+        self.is_stopped = True
 
     def report(self) -> dict[str, Any]:
         """What was found, as a dict of plain values."""
         found = {
             "touches": self.done,
             "uncovered": len(self.whole.atlas.uncovered),
+            "felt": self.compared.felt,
             **self.whole.report(),
             "faceted": self._faceted / self._area,
             "within": self.compared.within,
@@ -249,17 +289,16 @@ class ObjectTouches:
     def _doubts(self, found: Mapping[str, Any]) -> list[core.Doubt]:
         """The doubts of its atlas, and what the mesh adds to these, the gravest first."""
         doubts, unit = self.whole.doubts(), unit_of(found)
-        if count := found["uncovered"]:
-            places = (many(count, "place", "places"),)
-            if not self._is_cut_short:
-                return doubts
-            others = (doubt for doubt in doubts if doubt.code != "cut_short")
-            return [core.Doubt("stopped", count, words=places), *others]
         off, farthest = self.compared.largest, OFF_TOLERANCES * self.tolerance
+        if count := found["uncovered"]:
+            words = within(found["felt"], False), length(off, unit)
+            code = "stopped" if self.whole.atlas.is_cut_short else "out_of_reach"
+            others = (doubt for doubt in doubts if doubt.code not in ("cut_short", "goes_on"))
+            return [core.Doubt(code, count, words=words), *others]
         useless = (core.FINER,) if self.edge else (core.SHORTER_EDGES,)
         if off > farthest:
-            if self.surface.has_rims() and not (self.edge and not doubts):
-                return [core.Doubt("open_edges", off, farthest, (length(off, unit),)), *doubts]
+            if not (self.edge and not doubts) and (why := self._why_far(unit)):
+                return [why, *doubts]
             return [*doubts, core.Doubt("off_mesh", off, farthest, (length(off, unit),), useless)]
         if self.compared.within < WITHIN_SHARE:
             share = (within(self.compared.within, False),)
@@ -268,6 +307,13 @@ class ObjectTouches:
             lengths = length(found["height_std"], unit), length(self.tolerance, unit)
             doubts.append(core.Doubt("mean_height", found["height_std"], self.tolerance, lengths))
         return doubts
+
+    def _why_far(self, unit: Unit) -> core.Doubt | None:
+        """The doubt about the place where surface and mesh are farthest apart, as `why_far` has it."""
+        place, mesh = self.compared.place, self.whole.mesh
+        nearest = int(mesh.patch[np.argmin(((mesh.vertices - place) ** 2).sum(axis=1))])
+        patch = self.found[nearest] if nearest >= 0 else None
+        return why_far(self.surface, place, self.compared.largest, patch, unit)
 
 
 def tolerance_of(size: float, accuracy: str, noise: float) -> float:

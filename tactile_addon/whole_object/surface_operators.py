@@ -6,6 +6,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.props import IntProperty
 from mathutils import Vector
 
 from ..probes.in_slices import InSlices, Progress
@@ -15,11 +16,12 @@ from ..scene.attributes import DEVIATION
 from ..scene.mesh_data import own_mesh, values
 from ..touch import units
 from ..touch.arrays import read_array
-from ..touch.settings import draw_chosen
+from ..touch.settings import draw_chosen, length_property
 from ..touch.types import Object, Outcome, Point
 from . import kept, whole_mesh
-from .object_operator import EDGE
+from .object_operator import EDGE, Growing
 from .object_report import deviation, object_summary
+from .object_touches import ObjectTouches
 
 SEEN = 1.0  # The place is seen from so many sizes of the object, so that what is around it is seen, too.
 REACHED = 0.5  # A surface with less than this share of the largest deviation does not reach the object there.
@@ -77,7 +79,47 @@ def _select_nearest(mesh: bpy.types.Mesh, place: Point) -> Any:
     return mesh.vertices[nearest]
 
 
-class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
+class OnSurface(InSlices):
+    """For operators that make the active surface of a whole object anew, from the touches that are kept.
+
+    _touches : the ObjectTouches, once it has begun
+    """
+
+    _touches: ObjectTouches
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        hint = "Only the last surface that was touched has its touches in memory"
+        has_touches = polls(cls, kept.touches_of(surface_of(context)), hint)
+        return has_touches and is_in_object_mode(cls, context, "Surfaces are made")
+
+    def _kept(self, context: bpy.types.Context) -> ObjectTouches:
+        """The touches of the active surface, whose object is made anew."""
+        obj = surface_of(context)
+        patch_record.require_colored(obj)
+        self._uid, self._name = obj.session_uid, obj.name
+        return kept.touches_of(obj)
+
+    def _object(self, context: bpy.types.Context) -> Object:
+        """The object of the surface. Raises ValueError, with a sentence, if it is gone or may be edited."""
+        found = next((obj for obj in context.view_layer.objects if obj.session_uid == self._uid), None)
+        if found is None:
+            raise ValueError(f'"{self._name}" is gone, so it was not made again')
+        if context.mode != "OBJECT":
+            raise ValueError("Meshing was stopped because Object Mode was left: start it again")
+        return found
+
+    def _rewrite(self, context: bpy.types.Context) -> dict[str, Any]:
+        """Gives the object its new surface, and returns the record of that."""
+        obj = self._object(context)
+        report = self._touches.report() | {"source": obj[patch_record.ATLAS_RECORD]["source"]}
+        whole_mesh.rewrite(obj, self._touches.whole, report)
+        kept.keep(obj, self._touches)
+        record: dict[str, Any] = obj[patch_record.ATLAS_RECORD].to_dict()
+        return record
+
+
+class TACTILE_OT_mesh_again(OnSurface, bpy.types.Operator):
     """Make the surface again with edges of another length, from the same touches"""
 
     bl_idname = "tactile.mesh_again"
@@ -89,30 +131,12 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
     stop = "Keep It as It Was"
     stopped = "Stopped: the surface stays as it was"
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        hint = "Only the last surface that was touched has its touches in memory"
-        has_touches = polls(cls, kept.touches_of(surface_of(context)), hint)
-        return has_touches and is_in_object_mode(cls, context, "Surfaces are made")
-
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         return self._confirm(context, "Mesh Again")
 
     def _begin(self, context: bpy.types.Context) -> None:
-        obj = surface_of(context)
-        patch_record.require_colored(obj)
-        self._uid, self._name = obj.session_uid, obj.name
-        self._touches = kept.touches_of(obj).again(self.edge)
+        self._touches = self._kept(context).again(self.edge)
         self._steps = self._touches.meshing()
-
-    def _object(self, context: bpy.types.Context) -> Object:
-        """The object of the surface. Raises ValueError, with a sentence, if it is gone or may be edited."""
-        found = next((obj for obj in context.view_layer.objects if obj.session_uid == self._uid), None)
-        if found is None:
-            raise ValueError(f'"{self._name}" is gone, so it was not meshed again')
-        if context.mode != "OBJECT":
-            raise ValueError("Meshing was stopped because Object Mode was left: start it again")
-        return found
 
     def _check(self, context: bpy.types.Context) -> None:
         self._object(context)
@@ -122,11 +146,7 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
         return f"{self._touches.words}: {share:.0%}", share
 
     def _finish(self, context: bpy.types.Context) -> Outcome:
-        obj = self._object(context)
-        report = self._touches.report() | {"source": obj[patch_record.ATLAS_RECORD]["source"]}
-        whole_mesh.rewrite(obj, self._touches.whole, report)
-        kept.keep(obj, self._touches)
-        record = obj[patch_record.ATLAS_RECORD].to_dict()
+        record = self._rewrite(context)
         summary = object_summary(record)
         if self.edge > self._touches.whole.atlas.longest_edge():
             summary += f"; edges are {units.length(record['edge'])} long, as thin walls need"
@@ -138,4 +158,45 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
         draw_chosen(layout, self, "edge")
 
 
-CLASSES = (TACTILE_OT_look_farthest, TACTILE_OT_mesh_again)
+class TACTILE_OT_continue_touching(Growing, OnSurface, bpy.types.Operator):
+    """Go on touching the object from where its surface ended, with more touches or to a smaller tolerance"""
+
+    bl_idname = "tactile.continue_touching"
+    bl_label = "Continue Touching"
+    bl_options = {"UNDO"}
+
+    tolerance: length_property(
+        "Tolerance", "Standard deviation to reach for the height of each patch; 0 keeps that of the surface"
+    )
+    more: IntProperty(
+        name="More Touches",
+        description="Number of further touches after which to stop",
+        default=1000,
+        min=1,
+        soft_max=10_000,
+    )
+
+    stopped = "Stopped: the surface stays as it was"
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
+        return self._confirm(context, "Continue")
+
+    def _begin(self, context: bpy.types.Context) -> None:
+        before = self._kept(context)
+        before.surface.require_same(context)
+        self._touches = before.continued(self.tolerance or before.tolerance, self.more)
+        self._steps = self._shown()
+
+    def _finish(self, context: bpy.types.Context) -> Outcome:
+        self._touches.surface.require_same(context)
+        record = self._rewrite(context)
+        return report_done(self, object_summary(record), record["status"] == "ok")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split, layout.use_property_decorate = True, False
+        draw_chosen(layout, self, "tolerance")
+        layout.prop(self, "more")
+
+
+CLASSES = (TACTILE_OT_look_farthest, TACTILE_OT_mesh_again, TACTILE_OT_continue_touching)

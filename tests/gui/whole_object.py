@@ -36,7 +36,8 @@ MIDDLE = (520, 380)  # the middle of the viewport, where the object is
 
 def running():
     windows = bpy.context.window_manager.windows
-    return any(op.bl_idname == "TACTILE_OT_touch_all_over" for w in windows for op in w.modal_operators)
+    names = {"TACTILE_OT_touch_all_over", "TACTILE_OT_continue_touching"}
+    return any(op.bl_idname in names for w in windows for op in w.modal_operators)
 
 
 def surfaces():
@@ -203,6 +204,28 @@ def by_click():
         yield 1
 
 
+def continued(before):
+    """The surface goes on from where it ended, until the panel's button stops that."""
+    window, area, region = gui.find()
+    bpy.context.view_layer.objects.active = surfaces()[0]
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.tactile.continue_touching("INVOKE_DEFAULT", True)
+    yield 1
+    picture("whole_continue")
+    gui.xdo("key", "Return")
+    yield from until(running, 5)
+    yield 3
+    check("Continue: it is under way", running())
+    picture("whole_progress")
+    bpy.ops.tactile.stop()
+    yield from until(lambda: not running(), 120)
+    found = surfaces()
+    check("Continue: there is one surface still", len(found) == 1, data_blocks())
+    record = found[0]["tactile_object"].to_dict()
+    check("... with more touches", record["touches"] > before["touches"], record)
+    check("... and more of the object", record["felt"] >= before["felt"], (record["felt"], before["felt"]))
+
+
 def by_escape():
     bpy.context.view_layer.objects.active = bpy.data.objects["Target"]
     before = data_blocks()
@@ -219,9 +242,11 @@ def by_escape():
             picture("whole_part")
             record = surfaces()[0]["tactile_object"].to_dict()
             check("... which is open", not record["is_closed"], record)
-            check("... and says why", record["message"].startswith("Touching was stopped"), record["message"])
-            gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
-            yield 1
+            check("... and says why", record["message"].startswith("Touching ended when"), record["message"])
+            yield from continued(record)
+            for _ in range(2):
+                gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
+                yield 1
         check(f"{times} Esc: nothing else is left", data_blocks() == before, data_blocks())
 
 

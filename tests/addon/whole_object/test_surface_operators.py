@@ -110,6 +110,32 @@ def test_only_the_last_surface_can_be_meshed_again(empty, surface, ball):
 
 
 @pytest.mark.long
+@pytest.mark.long
+def test_an_incomplete_surface_is_continued_where_it_ended(empty, ball):
+    surface, few = made(empty.ops.tactile.touch_all_over, "tactile_object", tolerance=0.01, most=4)
+    assert few["uncovered"] and few["felt"] < 0.9
+    objects = len(empty.data.objects)
+    assert empty.ops.tactile.continue_touching(more=2) == {"FINISHED"}
+    record = surface["tactile_object"].to_dict()
+    assert (record["touches"], record["most"]) == (6, 6)
+    assert record["felt"] > few["felt"]
+    assert empty.ops.tactile.continue_touching() == {"FINISHED"}
+    record = surface["tactile_object"].to_dict()
+    assert (record["status"], record["is_closed"], record["tolerance"]) == ("ok", True, few["tolerance"])
+    assert empty.ops.tactile.continue_touching(tolerance=0.005) == {"FINISHED"}
+    finer = surface["tactile_object"].to_dict()
+    assert (finer["status"], finer["tolerance"]) == ("ok", pytest.approx(0.005))
+    assert finer["deviation_mean"] < record["deviation_mean"]
+    assert len(empty.data.objects) == objects
+    with pytest.raises(RuntimeError, match="is finer than the coordinates of"):
+        empty.ops.tactile.continue_touching(tolerance=1e-9)
+    ball.data.vertices[0].co.x += 1e-3
+    ball.data.update()
+    with pytest.raises(RuntimeError, match="was changed while it was touched: start again"):
+        empty.ops.tactile.continue_touching()
+    assert surface["tactile_object"].to_dict() == finer
+
+
 def test_a_range_is_given_in_the_unit_of_the_legend(surface):
     own = surface["tactile_object"]["color_limit"]
     surface.tactile_range = 2.0
@@ -161,6 +187,26 @@ def test_a_dialog_can_tell_how_many_touches_there_will_be(extension, empty, ball
     record = made(empty.ops.tactile.touch_all_over, "tactile_object", tolerance=0.02)[1]
     assert 0.5 < count / record["touches"] < 2.0
     assert expected.words(ball, empty.context, 0.005, "normal", 0.0) != words
+
+
+def test_a_dialog_can_tell_that_facets_will_be_felt(extension, empty):
+    expected = extension.tactile_addon.whole_object.expected.Expected()
+    empty.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
+    obj = empty.context.object
+    for is_faceted in (True, False):
+        expected.words(obj, empty.context, 0.0, "normal", 0.0)
+        assert expected.is_faceted is is_faceted
+        assert expected.warnings == ["Touches will feel its facets one by one"] * is_faceted
+        assert empty.ops.tactile.add_subdivision(target=obj.name) == {"FINISHED"}
+
+
+def test_a_dialog_can_tell_that_walls_are_thin(extension, empty):
+    expected = extension.tactile_addon.whole_object.expected.Expected()
+    empty.ops.mesh.primitive_cube_add(size=1.0)
+    empty.context.object.scale.z = 0.01
+    empty.context.view_layer.update()
+    expected.words(empty.context.object, empty.context, 0.0, "normal", 0.0)
+    assert expected.warnings == ["Walls of 1 % of its size may be bridged or pierced"]
 
 
 def test_the_mesh_of_thin_walls_is_fine(extension):

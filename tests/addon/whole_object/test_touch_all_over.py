@@ -130,8 +130,8 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball, extension):
     assert not record["is_closed"]
     assert record["uncovered"] > 0
     rows = dict(extension.tactile_addon.whole_object.object_report.object_rows(record))
-    places = f"{record['uncovered']} places"
-    assert (rows["Surface"], rows["Goes On At"]) == ("Incomplete", places)
+    share = f"{np.floor(1e3 * record['felt']) / 10:g} %"
+    assert (rows["Surface"], rows["Felt"]) == ("Incomplete", share)
     # Its far side does not show through where nothing was felt.
     assert not surface.show_in_front
     assert surface["tactile_above"] > 0.0
@@ -140,9 +140,11 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball, extension):
     assert np.linalg.norm(record["deviation_place"]) == pytest.approx(2.0, abs=0.01)
     assert np.abs(values(surface.data, "deviation")).max() < 0.1
     report = extension.tactile_addon.whole_object.object_report
-    assert report.object_verdict(record).startswith("Incomplete. The patches end at ")
-    assert "allow more touches" in record["message"]
-    assert report.object_summary(record) == f"Incomplete: 3 touches; the object goes on at {places}"
+    assert report.object_verdict(record).startswith(
+        f"Incomplete. Touching ended when {share} of the object was"
+    )
+    assert "continue with more touches" in record["message"]
+    assert report.object_summary(record) == f"Incomplete: 3 touches; {share} of the object"
     assert "Deviation" not in rows  # Most of it would be what was not felt.
 
 
@@ -175,6 +177,55 @@ def test_faces_without_vertices_inside_are_begun_in_their_middle(empty, shape, l
 
 
 @pytest.mark.long
+@pytest.fixture
+def begun(empty, extension):
+    """A function that begins to touch the active object at a place; returns the point of the first touch."""
+
+    def begun(place, tolerance=0.002):
+        touches = extension.tactile_addon.whole_object.object_touches.ObjectTouches(
+            empty.context.object,
+            empty.context.evaluated_depsgraph_get(),
+            location=place,
+            accuracy="normal",
+            tolerance=tolerance,
+            noise=0.0,
+            seed=0,
+            most=10,
+            edge=0.0,
+        )
+        next(touches.steps())
+        return touches.found[0].point + touches.surface.origin
+
+    return begun
+
+
+def add_boxes(bpy, *boxes):
+    """Adds an object of boxes, each with its middle and its widths."""
+    for middle, widths in boxes:
+        bpy.ops.mesh.primitive_cube_add(size=1.0, location=middle)
+        bpy.context.object.scale = widths
+    for obj in bpy.data.objects:
+        obj.select_set(True)
+    bpy.ops.object.join()
+    bpy.context.view_layer.update()
+
+
+def test_touches_begin_where_there_is_room(empty, begun):
+    """Neither in a slit nor on a thin ridge, but where it is asked for if that is elsewhere."""
+    ridge = (0.3, 0.0, 0.55), (0.01, 1.0, 0.1)
+    add_boxes(empty, ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)), ((0.0, 0.0, -1.01), (1.0, 1.0, 1.0)), ridge)
+    for place in ((0.1, 0.1, -0.5), (0.305, 0.1, 0.57)):
+        point = begun(place)
+        assert np.linalg.norm(point - place) > 0.1
+        assert abs(point[2] + 0.505) > 0.02
+    assert np.linalg.norm(begun((0.5, 0.2, 0.1)) - (0.5, 0.2, 0.1)) < 1e-3
+
+
+def test_touches_begin_where_a_patch_is_large_enough_to_go_on(empty, begun):
+    add_boxes(empty, ((0.0, 0.0, 0.0), (1.0, 0.7, 0.04)))
+    assert abs(begun((0.5, 0.0, 0.0), tolerance=0.03)[2]) == pytest.approx(0.02)
+
+
 def test_what_is_loose_is_no_part_of_the_object(empty, ball):
     ball.data.vertices.add(1)
     ball.data.vertices[-1].co = (1e3, 0.0, 0.0)

@@ -336,6 +336,32 @@ def test_steps_tell_what_was_found_and_the_same_seed_makes_the_same_touches(ball
         assert np.array_equal(again.frame.origin, first.frame.origin)
 
 
+def ended(steps):
+    """The touches that steps found, and the Atlas that they return."""
+    found = []
+    try:
+        while True:
+            found += next(steps).found
+    except StopIteration as end:
+        return found, end.value
+
+
+@pytest.mark.parametrize("tolerance", [1.6e-2, 4e-3])
+def test_touches_go_on_from_earlier_ones_also_to_a_smaller_tolerance(tolerance):
+    def touched(**options):
+        given = {"tolerance": tolerance, "noise": 1e-3, "rng": 0} | options
+        return ended(core.touch_all_over(RING, RING.start, RING.outward, **given))
+
+    few, cut_short = touched(tolerance=1.6e-2, most=5)
+    assert cut_short.uncovered
+    found, atlas = touched(earlier=few)
+    assert (atlas.status, len(atlas.uncovered)) == ("ok", 0)
+    assert np.abs(RING.distances(atlas.reference.mesh.vertices)).mean() < tolerance
+    assert len(found) == len(atlas.patches) <= 1.3 * len(touched()[0])
+    kept = [e for e in found if any(e is other for other in few)]
+    assert len(kept) == (len(few) if tolerance == 1.6e-2 else 0)  # The others are less certain.
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -1,0 +1,140 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which meshes have faces that point inward or lie on others, and where meshes are open."""
+
+import numpy as np
+import pytest
+
+from core.scan.face_orientation import DOUBLED, INWARD, open_edge_distance, orientation_fault
+
+BOX = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+
+
+def mesh(*parts):
+    """The arguments for all parts, (points, faces), as one mesh."""
+    points, corners, lengths, count = [], [], [], 0
+    for places, faces in parts:
+        points.append(places)
+        corners += [count + i for face in faces for i in face]
+        lengths += map(len, faces)
+        count += len(places)
+    return np.vstack(points), np.array(corners), np.cumsum([0, *lengths[:-1]])
+
+
+def fault(*parts):
+    return orientation_fault(*mesh(*parts))
+
+
+def turned(faces):
+    return [face[::-1] for face in faces]
+
+
+def soup(points, faces):
+    """The faces without common vertices, as an STL file has them."""
+    return points[np.concatenate(faces)], [
+        (4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 3) for i in range(len(faces))
+    ]
+
+
+def ball(n=24):
+    """A unit sphere of quads that spans its poles, a part of which rows of faces are."""
+    latitude, azimuth = np.pi * np.arange(n + 1) / n, 2.0 * np.pi * np.arange(2 * n) / (2 * n)
+    points = np.array([
+        (np.sin(v) * np.cos(u), np.sin(v) * np.sin(u), np.cos(v)) for v in latitude for u in azimuth
+    ])  # fmt: skip
+    points[np.abs(points) < 1e-12] = 0.0
+    faces = [
+        (
+            2 * n * i + j,
+            2 * n * (i + 1) + j,
+            2 * n * (i + 1) + (j + 1) % (2 * n),
+            2 * n * i + (j + 1) % (2 * n),
+        )
+        for i in range(n)
+        for j in range(2 * n)
+    ]
+    return points, faces
+
+
+SOUP = soup(BOX, QUADS)
+SPHERE, FACES = ball()
+SHEET = np.array([(x, y, 0.1 * np.sin(3.0 * x * y)) for x in range(5) for y in range(5)])
+SQUARES = [(5 * i + j, 5 * i + j + 5, 5 * i + j + 6, 5 * i + j + 1) for i in range(4) for j in range(4)]
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e4])
+@pytest.mark.parametrize(
+    "parts",
+    [
+        [(BOX, QUADS)],
+        [SOUP],
+        [(SPHERE, FACES)],
+        [(SPHERE, FACES[: len(FACES) // 2])],
+        [(SHEET, SQUARES)],
+        [(SHEET, turned(SQUARES))],
+        [(BOX, QUADS), (4.0 + 0.5 * BOX, QUADS)],
+        [(BOX, QUADS), (0.5 * BOX, turned(QUADS))],
+        [(BOX, QUADS), (0.9 + 0.5 * BOX, QUADS)],
+        [(BOX, QUADS), (0.5 * BOX, turned(QUADS)), (0.2 * BOX, QUADS)],
+        [(BOX, QUADS), (SPHERE, FACES[::3])],
+        [(np.zeros((3, 3)), [(0, 1, 2)])],
+    ],
+    ids=[
+        "box",
+        "soup",
+        "ball",
+        "bowl",
+        "sheet",
+        "below",
+        "apart",
+        "cavity",
+        "across",
+        "nested",
+        "loose",
+        "point",
+    ],
+)
+def test_right_faces_are_no_fault(parts, shift):
+    assert fault(*((shift + points, faces) for points, faces in parts)) == ""
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        [(BOX, turned(QUADS))],
+        [soup(BOX, turned(QUADS))],
+        [(SPHERE, turned(FACES))],
+        [(SPHERE, turned(FACES[48:]))],
+        [(BOX, QUADS), (4.0 + 0.5 * BOX, turned(QUADS))],
+        [(BOX, turned(QUADS)), (0.5 * BOX, QUADS)],
+        [(BOX, [*QUADS[:5], QUADS[5][::-1]])],
+        [(SPHERE, FACES[:500] + turned(FACES[500:]))],
+        [(SHEET, SQUARES[:7] + turned(SQUARES[7:8]) + SQUARES[8:])],
+    ],
+    ids=["box", "soup", "ball", "hole", "apart", "cavity", "one", "half", "sheet"],
+)
+def test_faces_that_point_inward_are_found(parts):
+    assert fault(*parts) == INWARD
+
+
+@pytest.mark.parametrize("points", [BOX, BOX[np.arange(8)] + 3.0])
+def test_faces_on_others_are_found(points):
+    assert fault((points, QUADS), (points, turned(QUADS))) == DOUBLED
+    assert fault((points, QUADS + turned(QUADS))) == DOUBLED
+
+
+def test_faces_on_others_that_face_the_same_way_are_felt_as_one():
+    assert fault((BOX, QUADS), (BOX, QUADS)) == ""
+
+
+def test_a_few_faces_on_others_are_no_doubled_mesh():
+    few = len(FACES) // 200
+    assert fault((SPHERE, FACES + turned(FACES[300 : 300 + few]))) == ""
+
+
+def test_edges_of_one_face_are_open():
+    assert np.isinf(open_edge_distance(*mesh(SOUP), (0.0, 0.0, 2.0)))
+    open_box = mesh((BOX, QUADS[:5]))
+    assert open_edge_distance(*open_box, (0.25, 0.0, 1.0)) == 0.75
+    assert open_edge_distance(*open_box, (4.0, 5.0, 1.0)) == 5.0
