@@ -97,9 +97,9 @@ def cover_contacts(
     atlas = Atlas(tuple(found), charts, reference, largest, uncovered, contacts=contacts)
     most = largest or GROWN * radius
     off_surface = partial(_off_surface, atlas, noise, most)
-    distances, far = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
+    distances, far, is_turned = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
     worst = _largest_cluster(far, distances, contacts.links)
-    status, text = _agreement(contacts, distances, far, worst)
+    status, text = _agreement(contacts, distances, far, worst, is_turned)
     places = [_place_at(contacts, i, radius) for i in worst[:1] if status != "ok"]
     said = "" if cloud.noise else f" No noise was given; that of the fit is {noise:.2g}."
     doubt = doubt or _doubt_of_surface(atlas, 0.0 if cloud.noise else noise, most)
@@ -208,15 +208,16 @@ def _beyond_bend(centers: Array, contacts: Array, links: NDArray[np.intp]) -> tu
 
 def _off_surface(
     atlas: Atlas, noise: float, most: float, points: Array, normals: Array
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Distances (n,) of contacts (n, 3) from the surface, and which are too far or face the other way.
+) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Distances (n,) of contacts (n, 3) from the surface, which do not agree, and which face the other way.
 
     Deviations count up to `most`, that of patches, for where there is none they would explain anything.
     """
     distances, stds = atlas.distance(points)
     faces = atlas.reference.normals[atlas.reference.feet(points)[1]]
     far = too_far(distances, np.hypot(np.minimum(stds, most), noise))
-    return np.abs(distances), far | (row_dot(faces, normals) < 0.0)
+    is_turned = row_dot(faces, normals) < 0.0
+    return np.abs(distances), far | is_turned, is_turned
 
 
 def _doubt_of_surface(atlas: Atlas, noise: float, most: float) -> tuple[str, str] | None:
@@ -243,7 +244,11 @@ def _largest_cluster(far: NDArray[np.bool_], distances: Array, links: NDArray[np
 
 
 def _agreement(
-    contacts: MeasuredContacts, distances: Array, far: NDArray[np.bool_], worst: NDArray[np.intp]
+    contacts: MeasuredContacts,
+    distances: Array,
+    far: NDArray[np.bool_],
+    worst: NDArray[np.intp],
+    is_turned: NDArray[np.bool_],
 ) -> tuple[str, str]:
     """The status and a sentence on which contacts (n,) are far off the surface, and the worst cluster (k,).
 
@@ -257,9 +262,11 @@ def _agreement(
     )
     if far.mean() <= FEW and len(worst) <= len(QUADRIC):
         return "ok", f"The surface is closed. All but {off} agree with it, which are off {where}."
-    return "uncertain", (
-        f"{off} are off the surface or face the other way, {where}: feel more there, or give their noise."
-    )
+    if is_turned[worst].any():
+        advice = "the wall or gap there is too thin for these strokes: make them nearer, or measure normals"
+    else:
+        advice = "feel more there, or give their noise"
+    return "uncertain", f"{off} are off the surface or face the other way, {where}: {advice}."
 
 
 def _place_at(contacts: MeasuredContacts, i: int, radius: float) -> RimPlace:
@@ -392,12 +399,14 @@ def _patches(cloud: _Cloud, radius: float) -> Generator[float, None, tuple[list[
     for i in range(len(left)):
         if not left[i]:
             continue
-        r, last = cloud.longest_sure(i, radii, last)
-        left[cloud.same_sheet(i, MISSING * radius)] = False
+        some = cloud.same_sheet(i, radius)
+        middle = some[np.argmin(np.linalg.norm(points[some] - points[some].mean(axis=0), axis=1))]
+        r, last = cloud.longest_sure(middle, radii, last)
+        left[cloud.same_sheet(i, MISSING * radius) if r is None else i] = False
         if r is not None:
             found.append(r)
-            tables.append(tabulate(r, cloud.rim(i, r), deviations=True))
-            chart, some = stacked([r], tables[-1:]), cloud.same_sheet(i, PATCHES_APART * r.radius)
+            tables.append(tabulate(r, cloud.rim(middle, r), deviations=True))
+            chart, some = stacked([r], tables[-1:]), cloud.same_sheet(middle, PATCHES_APART * r.radius)
             x, y, _ = chart.local(points[some], np.arange(len(some)), np.zeros(len(some), dtype=np.intp))
             left[some] &= chart.shares(x, y, np.zeros(len(some), dtype=np.intp)) > COVERED
         yield 1.0 - float(left.mean())

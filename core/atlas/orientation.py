@@ -21,7 +21,8 @@ FEWEST, MOST, MORE = 8, 600, 1.5  # The numbers of a plane's neighbors, and thei
 ACROSS = 0.15  # they do not lie in a line if this share of the larger variance is across,
 FLAT = 0.05  # and lie in a plane if at most this share of the smaller one is off it,
 NOISES = 8.0  # and they reach this many deviations of a contact far.
-FLATTER, THROUGH = 0.5, 2.0  # A neighbor's plane is flatter by this factor, at most this many deviations off.
+FLATTER, THROUGH = 0.5, 2.0  # A neighbor's plane is flatter by this factor, at most this many deviations off,
+SHARPENINGS = 3  # and is passed on from neighbor to neighbor this often.
 LINKS = 12  # A contact is linked with this many of its neighbors.
 AT_ONCE = 20_000  # This many contacts are taken at once.
 BEND = 0.1  # Links along which the surface goes on come before those around edges and across gaps,
@@ -96,15 +97,16 @@ def sharpened(points: Array, normals: Array, planes: Planes) -> Array:
 
     normals : (n, 3), outward: measured ones, or those of the contacts' own planes
     """
-    links, rms = planes.links, planes.rms
-    off = np.abs(row_dot(normals[links], points[:, None] - points[links]))
-    is_unfit = (rms[links] > FLATTER * rms[:, None]) | (off > THROUGH * rms[links])
-    off = np.where(is_unfit, np.inf, np.hypot(off, rms[links]))
-    best = np.argmin(off, axis=1)
-    every = np.arange(len(points))
-    other = normals[links[every, best]]
-    other = other * np.copysign(1.0, row_dot(other, normals))[:, None]
-    return np.where(np.isfinite(off[every, best])[:, None], other, normals)
+    links, rms, every = planes.links, planes.rms, np.arange(len(points))
+    for _ in range(SHARPENINGS):
+        off = np.abs(row_dot(normals[links], points[:, None] - points[links]))
+        is_unfit = (rms[links] > FLATTER * rms[:, None]) | (off > THROUGH * rms[links])
+        off = np.where(is_unfit, np.inf, np.hypot(off, rms[links]))
+        best = links[every, np.argmin(off, axis=1)]
+        is_fit = np.isfinite(off.min(axis=1))
+        others = normals[best] * np.copysign(1.0, row_dot(normals[best], normals))[:, None]
+        normals, rms = np.where(is_fit[:, None], others, normals), np.where(is_fit, rms[best], rms)
+    return normals
 
 
 def reflection_agreement(points: Array, normals: Array, i: Indices, j: Indices) -> tuple[Array, Array]:
