@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The samples for Python alone of README.md and docs/ run page by page on contacts with normals and without, in
-one file and in several."""
+"""The samples for Python alone of README.md and docs/ run page by page, on contacts with normals and
+without, in one file and in several."""
 
 import re
 import shutil

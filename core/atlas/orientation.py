@@ -7,7 +7,6 @@ Of two contacts on an arc one normal is the mirror image of the other in the pla
 Gumhold 2009), also across a sharp edge, a wall or a gap. Links along strokes come first.
 """
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -120,17 +119,17 @@ def reflection_agreement(points: Array, normals: Array, i: Indices, j: Indices) 
 
 
 def oriented(
-    strokes: Sequence[Array], planes: Planes, known: Array | None = None, up: Array | None = None
+    points: Array, planes: Planes, stroke: Indices, known: Array | None = None, up: Array | None = None
 ) -> Array:
-    """Outward unit normals (n, 3) of the contacts of strokes (k, 3) with planes.
+    """Outward unit normals (n, 3) of points (n, 3) with planes.
 
+    stroke : (n,), the number of the stroke of each
     known : (n, 3), measured unit normals; 0 where there are none
     up : (3,), a hint, a direction to the outer side
 
     Raises ValueError if nothing tells the outer side.
     """
-    points = np.vstack(list(strokes))
-    links = _links(points, planes, [len(stroke) for stroke in strokes])
+    links = _links(points, planes, stroke)
     links = _bridged(points, planes.normals, *links)
     sides, order, ends = _propagated_signs(points, planes.normals, *links)
     normals = sides[:, None] * planes.normals
@@ -139,12 +138,10 @@ def oriented(
     return normals * _global_sign(normals, known, up, number)
 
 
-def _links(points: Array, planes: Planes, lengths: Sequence[int]) -> tuple[Indices, Indices, Array]:
+def _links(points: Array, planes: Planes, stroke: Indices) -> tuple[Indices, Indices, Array]:
     """Pairs of neighbors and of successive contacts, (m,) each, and their weights (m,)."""
-    n = len(points)
-    i, j = np.repeat(np.arange(n), LINKS), planes.links.ravel()
-    ends = np.cumsum(lengths) - 1
-    before = np.setdiff1d(np.arange(n - 1), ends)
+    i, j = np.repeat(np.arange(len(points)), LINKS), planes.links.ravel()
+    before = np.flatnonzero(np.diff(stroke) == 0)
     step = np.linalg.norm(points[before + 1] - points[before], axis=1)
     before = before[step < STEP * planes.reach[before]]
     factor = np.repeat([1.0, STROKE], [len(i), len(before)])
