@@ -319,12 +319,13 @@ def oriented_strokes(thing, gap):
     normals = np.vstack([n for _, n in strokes])
     felt = [p + rng.normal(0.0, NOISE, p.shape) for p, _ in strokes]
     start = process_time()
-    planes = planes_of(np.vstack(felt), NOISE)
+    points, stroke = np.vstack(felt), np.repeat(np.arange(len(felt)), [len(some) for some in felt])
+    planes = planes_of(points, NOISE)
     try:
-        found = oriented(felt, planes)
+        found = oriented(points, planes, stroke)
     except ValueError as error:
         return felt, np.nan, f"refused: {error}", process_time() - start
-    doubt = next(doubts_of(np.vstack(felt), found, planes), None)
+    doubt = next(doubts_of(points, found, planes), None)
     seconds = process_time() - start
     return felt, np.mean(np.einsum("ni,ni->n", found, normals) > 0.0), doubt, seconds
 

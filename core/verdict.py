@@ -149,6 +149,11 @@ REASONS = {
         "{0} are off the surface or face the other way, by up to {value:.2g}, most together around {1}",
         ("feel more there", "give their noise"),
     ),
+    "confused": Reason(
+        "{0} are off the surface or face the other way, by up to {value:.2g}, most together around {1}, "
+        "where strokes are farther apart than half of the wall or gap",
+        ("make strokes nearer to each other", "measure normals"),
+    ),
     "unfelt": Reason("Nothing was felt beyond {0} where the object may go on", ("touch there",)),
     # A whole object that was touched.
     "stopped": Reason(

@@ -22,7 +22,7 @@ from ..steps import chunked, part_of, result_of
 from ..triangles import row_dot
 from ..verdict import Doubt, beyond
 from .charts import AZIMUTHS, Charts
-from .connectivity import connected_pieces
+from .connectivity import Indices, connected_pieces
 from .finger import FACING
 from .frontier import RimPlace
 from .join import stacked, tabulate
@@ -87,20 +87,20 @@ def cover_contacts(
 
     largest = None if tolerance is None else number("tolerance", tolerance, above=0.0)
     noise = None if noise is None else number("noise", noise, least=0.0)
-    strokes, points, noise = _strokes(contours_or_strokes, noise, largest)
-    contacts, doubts = _contacts(strokes, points, outward, noise)
+    strokes, noise, radius = _strokes(contours_or_strokes, noise, largest)
+    contacts, doubts = _contacts(strokes, outward, noise)
     cloud = _Cloud(contacts, cKDTree(contacts.points), noise, largest)
     yield 0.0
-    radius, noise = yield from cloud.least_radius_and_noise()
+    radius, noise = yield from cloud.least_radius_and_noise(radius)
     found, charts = yield from _patches(cloud._replace(noise=noise), radius)
     reference = yield from part_of(joined_surface(found, charts, largest, contacts.off), 1.0, 1.0)
     uncovered = uncovered_places(reference, charts)
     atlas = Atlas(tuple(found), charts, reference, largest, uncovered, contacts=contacts)
     most = largest or GROWN * radius
     off_surface = partial(_off_surface, atlas, noise, most)
-    distances, far = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
+    distances, far, is_turned = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
     worst = _largest_cluster(far, distances, contacts.links)
-    off = _doubts_of_contacts(contacts, distances, far, worst)
+    off = _doubts_of_contacts(contacts, distances, far, worst, is_turned)
     doubts += [*_doubts_of_surface(atlas, 0.0 if cloud.noise else noise, most), *off]
     return replace(
         atlas,
@@ -110,22 +110,63 @@ def cover_contacts(
     )
 
 
+class _Strokes(NamedTuple):
+    """Contacts of strokes, each once.
+
+    points, normals : (n, 3); normals as they were given, or 0
+    stroke : (n,), the stroke of each
+    known, balls : (n,), whether it has a normal, and the radius of the ball whose center it is, or 0
+    """
+
+    points: Array
+    normals: Array
+    stroke: Indices
+    known: NDArray[np.bool_]
+    balls: Array
+
+
+def _strokes(
+    given: Sequence[ArrayLike | Contour], noise: float | None, tolerance: float | None
+) -> tuple[_Strokes, float, float]:
+    """The contacts of all strokes, their noise and the least radius of a patch, checked."""
+    curves = [
+        curve if isinstance(curve, Contour) else Contour(curve)  # type: ignore[arg-type]
+        for curve in list_of("contours_or_strokes", given, object)  # type: ignore[arg-type]
+    ]
+    points = np.vstack([np.empty((0, 3)), *(curve.points for curve in curves)])
+    order, starts = equal_points(points)
+    once = np.sort(order[starts])
+    points = points[once]
+    radius = _least_radius(points)
+    size = float(np.ptp(points, axis=0).max())
+    if noise is None:
+        noise = max(curve.noise or 0.0 for curve in curves)
+    if noise > size:
+        raise ValueError(f"noise: expected less than the size of what was felt, {size:.3g}, got {noise:.3g}")
+    if tolerance is not None and tolerance > COARSEST * size:
+        raise ValueError(
+            f"tolerance: expected at most {COARSEST * size:.3g}, a tenth of the size, got {tolerance:.3g}"
+        )
+    stroke = np.repeat(np.arange(len(curves)), [len(curve.points) for curve in curves])[once]
+    known = np.array([curve.normals is not None for curve in curves])[stroke]
+    balls = np.array([curve.ball or 0.0 for curve in curves])[stroke]
+    normals = np.vstack([0.0 * curve.points if curve.normals is None else curve.normals for curve in curves])
+    return _Strokes(points, normals[once], stroke, known, balls), noise, radius
+
+
 def _contacts(
-    strokes: list[Contour], points: Array, outward: ArrayLike | None, noise: float
+    strokes: _Strokes, outward: ArrayLike | None, noise: float
 ) -> tuple[MeasuredContacts, list[Doubt]]:
-    """Contacts (n, 3) of strokes with outward normals, and why the normals are in doubt."""
+    """The contacts of strokes with outward normals, and why the normals are in doubt."""
     up = None if outward is None else unit_vector("outward", outward)
-    own = [np.zeros(stroke.points.shape) if stroke.normals is None else stroke.normals for stroke in strokes]
-    known = np.repeat([stroke.normals is not None for stroke in strokes], [len(some) for some in own])
-    normals, planes = np.vstack(own), planes_of(points, noise)
+    (points, normals, stroke, known, balls), planes = strokes, planes_of(strokes.points, noise)
     normals[known] = unit_vectors("normals", normals[known])
     if not known.all():
-        normals[~known] = oriented([stroke.points for stroke in strokes], planes, normals, up)[~known]
+        normals[~known] = oriented(points, planes, stroke, normals, up)[~known]
     else:
         _require_one_side(points, normals)
     doubts = list(doubts_of(points, normals, planes))
     normals[~known] = sharpened(points, normals, planes)[~known]
-    balls = np.repeat([stroke.ball or 0.0 for stroke in strokes], [len(some) for some in own])
     if balls.any():
         centers, points = points, points - balls[:, None] * normals
         doubts += _beyond_bend(centers, points, planes.links)
@@ -133,42 +174,26 @@ def _contacts(
     return MeasuredContacts(points, normals, planes.reach, planes.links), doubts
 
 
-def _strokes(
-    given: Sequence[ArrayLike | Contour], noise: float | None, tolerance: float | None
-) -> tuple[list[Contour], Array, float]:
-    """The strokes, all their contacts (n, 3) and the noise, checked."""
-    strokes = [
-        stroke if isinstance(stroke, Contour) else Contour(stroke)  # type: ignore[arg-type]
-        for stroke in list_of("contours_or_strokes", given, object)  # type: ignore[arg-type]
-    ]
-    strokes, points = _each_once(strokes)
+def _least_radius(points: Array) -> float:
+    """The radius of the smallest patches of points (n, 3), which have FEWEST of them.
+
+    Raises ValueError if there are fewer, or numbers do not hold such patches.
+    """
+    from scipy.spatial import cKDTree
+
     if len(points) < FEWEST:
         raise ValueError(f"contours_or_strokes: expected {FEWEST} contacts or more, got {len(points)}")
-    size = float(np.ptp(points, axis=0).max())
-    if 0.0 < size < SMALLEST:
-        raise _too_near()
-    if noise is None:
-        noise = max(stroke.noise or 0.0 for stroke in strokes)
-    if noise > size:
-        raise ValueError(f"noise: expected less than the size of what was felt, {size:.3g}, got {noise:.3g}")
-    if tolerance is not None and tolerance > COARSEST * size:
+    some = points[np.linspace(0, len(points) - 1, SOME_PLACES).astype(np.intp)]
+    radius = float(np.median(cKDTree(points).query(some, FEWEST)[0][:, -1]))
+    if radius < SMALLEST:
         raise ValueError(
-            f"tolerance: expected at most {COARSEST * size:.3g}, a tenth of the size, got {tolerance:.3g}"
+            f"contours_or_strokes: expected contacts at least {SMALLEST:g} apart, got nearer ones: use "
+            "another unit of length"
         )
-    return strokes, points, noise
-
-
-def _each_once(strokes: list[Contour]) -> tuple[list[Contour], Array]:
-    """The strokes without contacts that earlier ones have, too, which add nothing; all contacts (n, 3)."""
-    points = np.vstack([np.empty((0, 3)), *(stroke.points for stroke in strokes)])
-    order, starts = equal_points(points)
-    is_first = np.bincount(order[starts], minlength=len(points)) > 0
-    found, ends = [], np.cumsum([len(stroke.points) for stroke in strokes])
-    for stroke, end in zip(strokes, ends.tolist(), strict=True):
-        which = is_first[end - len(stroke.points) : end]
-        normals = None if stroke.normals is None else stroke.normals[which]
-        found.append(stroke if which.all() else replace(stroke, points=stroke.points[which], normals=normals))
-    return found, points[is_first]
+    gap = float(np.spacing(np.abs(points).max()))
+    if gap > TOUCH_ROUNDING * radius:
+        raise too_coarse(gap, radius)
+    return radius
 
 
 def _require_one_side(points: Array, normals: Array) -> None:
@@ -194,7 +219,7 @@ def _require_one_side(points: Array, normals: Array) -> None:
         )
 
 
-def _beyond_bend(centers: Array, contacts: Array, links: NDArray[np.intp]) -> Iterator[Doubt]:
+def _beyond_bend(centers: Array, contacts: Array, links: Indices) -> Iterator[Doubt]:
     """Whether a ball is larger than the bends of its centers (n, 3) at many of them.
 
     There kappa_center < -1 / r, and contacts (n, 3) lie the other way around than their centers.
@@ -208,15 +233,16 @@ def _beyond_bend(centers: Array, contacts: Array, links: NDArray[np.intp]) -> It
 
 def _off_surface(
     atlas: Atlas, noise: float, most: float, points: Array, normals: Array
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Distances (n,) of contacts (n, 3) from the surface, and which are too far or face the other way.
+) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Distances (n,) of contacts (n, 3) from the surface, which do not agree, and which face the other way.
 
     Deviations count up to `most`, that of patches, for where there is none they would explain anything.
     """
     distances, stds = atlas.distance(points)
     faces = atlas.reference.normals[atlas.reference.feet(points)[1]]
     far = too_far(distances, np.hypot(np.minimum(stds, most), noise))
-    return np.abs(distances), far | (row_dot(faces, normals) < 0.0)
+    is_turned = row_dot(faces, normals) < 0.0
+    return np.abs(distances), far | is_turned, is_turned
 
 
 def _doubts_of_surface(atlas: Atlas, noise: float, most: float) -> Iterator[Doubt]:
@@ -226,7 +252,7 @@ def _doubts_of_surface(atlas: Atlas, noise: float, most: float) -> Iterator[Doub
         yield Doubt("cavity")
 
 
-def _largest_cluster(far: NDArray[np.bool_], distances: Array, links: NDArray[np.intp]) -> NDArray[np.intp]:
+def _largest_cluster(far: NDArray[np.bool_], distances: Array, links: Indices) -> Indices:
     """The indices (k,) of most of those contacts (n,) that are side by side and off, the farthest first."""
     i, k = np.nonzero(far[:, None] & far[links])
     _, piece = connected_pieces(i, links[i, k], len(far))
@@ -235,7 +261,11 @@ def _largest_cluster(far: NDArray[np.bool_], distances: Array, links: NDArray[np
 
 
 def _doubts_of_contacts(
-    contacts: MeasuredContacts, distances: Array, far: NDArray[np.bool_], worst: NDArray[np.intp]
+    contacts: MeasuredContacts,
+    distances: Array,
+    far: NDArray[np.bool_],
+    worst: Indices,
+    is_turned: NDArray[np.bool_],
 ) -> list[Doubt]:
     """Whether more than a few contacts (n,) are far off the surface, given the worst cluster of them (k,).
 
@@ -244,14 +274,15 @@ def _doubts_of_contacts(
     if not far.any() or (far.mean() <= FEW and len(worst) <= len(QUADRIC)):
         return []
     words = f"{np.count_nonzero(far)} of {len(far)} contacts", place_text(contacts.points[worst[:1]])
-    return [Doubt("off_surface", float(distances[far].max()), words=words)]
+    code = "confused" if is_turned[worst].any() else "off_surface"
+    return [Doubt(code, float(distances[far].max()), words=words)]
 
 
 def _agreement(
     contacts: MeasuredContacts,
     distances: Array,
     far: NDArray[np.bool_],
-    worst: NDArray[np.intp],
+    worst: Indices,
     noise: float,
 ) -> str:
     """How contacts (n,) agree with the surface if there is no doubt; `noise` is that of the fit, or 0."""
@@ -281,7 +312,7 @@ class _Cloud(NamedTuple):
     noise: float
     largest: float | None
 
-    def same_sheet(self, i: int, radius: float) -> NDArray[np.intp]:
+    def same_sheet(self, i: int, radius: float) -> Indices:
         """Those contacts around contact i that face the same way and are linked with it, so of its wall."""
         near = np.array(self.tree.query_ball_point(self.contacts.points[i], radius))
         near = near[self.contacts.normals[near] @ self.contacts.normals[i] > FACING]
@@ -290,6 +321,12 @@ class _Cloud(NamedTuple):
         linked = near[at] == links
         _, piece = connected_pieces(np.nonzero(linked)[0], at[linked], len(near))
         return near[piece == piece[np.flatnonzero(near == i)]]
+
+    def middle(self, i: int, radius: float) -> int:
+        """The contact in the middle of the wall around contact i."""
+        some = self.same_sheet(i, radius)
+        points = self.contacts.points[some]
+        return int(some[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))])
 
     def patches(self, places: Sequence[int], radius: float) -> list[Reconstruction | None]:
         """The patch of those contacts around each place that are of its wall; None where they carry none."""
@@ -334,29 +371,28 @@ class _Cloud(NamedTuple):
                 return r, k
         return None, 0
 
-    def explains(self, r: Reconstruction, some: NDArray[np.intp]) -> bool:
+    def explains(self, r: Reconstruction, some: Indices) -> bool:
         """Whether a patch explains some of the contacts, to which it was fitted, within their noise."""
         far = np.zeros(len(self.contacts.points), dtype=bool)
         far[some] = too_far(self.distances(r, some), self.noise)
         return are_few(far[some], far[self.contacts.links[some]].any(axis=1))
 
-    def distances(self, r: Reconstruction, some: NDArray[np.intp]) -> Array:
+    def distances(self, r: Reconstruction, some: Indices) -> Array:
         """Distances (n,) of some of the contacts from a patch, measured from its tangent planes."""
         x, y, z = r.frame.to_local(self.contacts.points[some]).T
         surface = r.geometry.derivatives(x, y)
         return np.asarray(surface.normal[:, 2] * (z - surface.z))
 
-    def least_radius_and_noise(self) -> Generator[float, None, tuple[float, float]]:
+    def least_radius_and_noise(self, radius: float) -> Generator[float, None, tuple[float, float]]:
         """The least radius at which patches exist at half of some places, for contacts may lie in lines.
 
         Also the noise: if none was given, it is the deviation of contacts from these patches, at least MISFIT
-        of their radius. Raises ValueError if there are none, or numbers do not hold such patches. Yields 0
-        after each trial.
+        of their radius. Raises ValueError if there are none. Yields 0 after each trial.
+
+        radius : the first that is tried
         """
         points = self.contacts.points
         some = np.linspace(0, len(points) - 1, SOME_PLACES).astype(np.intp).tolist()
-        radius = float(np.median(self.tree.query(points[some], FEWEST)[0][:, -1]))
-        self._require_fine(radius)
         for _ in range(WIDENINGS):
             found = [(i, r) for i, r in zip(some, self.patches(some, radius), strict=True) if r is not None]
             if len(found) * 2 >= SOME_PLACES:
@@ -368,21 +404,6 @@ class _Cloud(NamedTuple):
             "contours_or_strokes: expected contacts all around at least one of them, got "
             f"{len(points)} without"
         )
-
-    def _require_fine(self, radius: float) -> None:
-        """Raises ValueError if patches of this radius are too small for double precision."""
-        if 0.0 < radius < SMALLEST:
-            raise _too_near()
-        gap = float(np.spacing(np.abs(self.contacts.points).max()))
-        if gap > TOUCH_ROUNDING * radius > 0.0:
-            raise too_coarse(gap, radius)
-
-
-def _too_near() -> ValueError:
-    return ValueError(
-        f"contours_or_strokes: expected contacts at least {SMALLEST:g} apart, got nearer ones: use another "
-        "unit of length"
-    )
 
 
 def _patches(cloud: _Cloud, radius: float) -> Generator[float, None, tuple[list[Reconstruction], Charts]]:
@@ -397,12 +418,16 @@ def _patches(cloud: _Cloud, radius: float) -> Generator[float, None, tuple[list[
     for i in range(len(left)):
         if not left[i]:
             continue
+        middle = i
         r, last = cloud.longest_sure(i, radii, last)
-        left[cloud.same_sheet(i, MISSING * radius)] = False
+        if r is None:  # At an edge there are no contacts on one side of it.
+            middle = cloud.middle(i, radius)
+            r, last = cloud.longest_sure(middle, radii, last)
+        left[cloud.same_sheet(i, MISSING * radius) if r is None else i] = False
         if r is not None:
             found.append(r)
-            tables.append(tabulate(r, cloud.rim(i, r), deviations=True))
-            chart, some = stacked([r], tables[-1:]), cloud.same_sheet(i, PATCHES_APART * r.radius)
+            tables.append(tabulate(r, cloud.rim(middle, r), deviations=True))
+            chart, some = stacked([r], tables[-1:]), cloud.same_sheet(middle, PATCHES_APART * r.radius)
             x, y, _ = chart.local(points[some], np.arange(len(some)), np.zeros(len(some), dtype=np.intp))
             left[some] &= chart.shares(x, y, np.zeros(len(some), dtype=np.intp)) > COVERED
         yield 1.0 - float(left.mean())

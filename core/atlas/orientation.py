@@ -7,8 +7,8 @@ Of two contacts on an arc one normal is the mirror image of the other in the pla
 Gumhold 2009), also across a sharp edge, a wall or a gap. Links along strokes come first.
 """
 
-from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,7 +22,8 @@ FEWEST, MOST, MORE = 8, 600, 1.5  # The numbers of a plane's neighbors, and thei
 ACROSS = 0.15  # they do not lie in a line if this share of the larger variance is across,
 FLAT = 0.05  # and lie in a plane if at most this share of the smaller one is off it,
 NOISES = 8.0  # and they reach this many deviations of a contact far.
-FLATTER, THROUGH = 0.5, 2.0  # A neighbor's plane is flatter by this factor, at most this many deviations off.
+FLATTER, THROUGH = 0.5, 2.0  # A neighbor's plane is flatter by this factor, at most this many deviations off,
+SHARPENINGS = 3  # and is passed on from neighbor to neighbor this often.
 LINKS = 12  # A contact is linked with this many of its neighbors.
 AT_ONCE = 20_000  # This many contacts are taken at once.
 BEND = 0.1  # Links along which the surface goes on come before those around edges and across gaps,
@@ -36,10 +37,9 @@ CONFUSED = 0.05  # and not more than this share may have the other side of a wal
 FACING = 0.8  # Contacts face each other across a wall if they and the way between them do by this cosine.
 CLOSED = 0.15  # Contacts show their outer side if the mean of their winding numbers is more.
 DECISIVE = 0.3  # A hint decides if the mean cosine between it and the normals is more.
-CERTAIN = 0.02  # Links of less weight are certain,
-SMALL = 0.1  # and a region has at least this share of all contacts.
-ROUNDS = 3  # Regions are tried this often.
-PROBES = 30  # Winding numbers are computed at this many contacts of a region.
+SMALL = 0.1  # Together at least this share of the contacts is turned,
+CLEAR = 0.5  # by which the square by which winding numbers are off a half falls so much for each of them.
+PROBES = 300  # Winding numbers are computed at this many contacts.
 
 
 class Planes(NamedTuple):
@@ -98,15 +98,16 @@ def sharpened(points: Array, normals: Array, planes: Planes) -> Array:
 
     normals : (n, 3), outward: measured ones, or those of the contacts' own planes
     """
-    links, rms = planes.links, planes.rms
-    off = np.abs(row_dot(normals[links], points[:, None] - points[links]))
-    is_unfit = (rms[links] > FLATTER * rms[:, None]) | (off > THROUGH * rms[links])
-    off = np.where(is_unfit, np.inf, np.hypot(off, rms[links]))
-    best = np.argmin(off, axis=1)
-    every = np.arange(len(points))
-    other = normals[links[every, best]]
-    other = other * np.copysign(1.0, row_dot(other, normals))[:, None]
-    return np.where(np.isfinite(off[every, best])[:, None], other, normals)
+    links, rms, every = planes.links, planes.rms, np.arange(len(points))
+    for _ in range(SHARPENINGS):
+        off = np.abs(row_dot(normals[links], points[:, None] - points[links]))
+        is_unfit = (rms[links] > FLATTER * rms[:, None]) | (off > THROUGH * rms[links])
+        off = np.where(is_unfit, np.inf, np.hypot(off, rms[links]))
+        best = links[every, np.argmin(off, axis=1)]
+        is_fit = np.isfinite(off.min(axis=1))
+        others = normals[best] * np.copysign(1.0, row_dot(normals[best], normals))[:, None]
+        normals, rms = np.where(is_fit[:, None], others, normals), np.where(is_fit, rms[best], rms)
+    return normals
 
 
 def reflection_agreement(points: Array, normals: Array, i: Indices, j: Indices) -> tuple[Array, Array]:
@@ -120,31 +121,29 @@ def reflection_agreement(points: Array, normals: Array, i: Indices, j: Indices) 
 
 
 def oriented(
-    strokes: Sequence[Array], planes: Planes, known: Array | None = None, up: Array | None = None
+    points: Array, planes: Planes, stroke: Indices, known: Array | None = None, up: Array | None = None
 ) -> Array:
-    """Outward unit normals (n, 3) of the contacts of strokes (k, 3) with planes.
+    """Outward unit normals (n, 3) of points (n, 3) with planes.
 
+    stroke : (n,), the number of the stroke of each
     known : (n, 3), measured unit normals; 0 where there are none
     up : (3,), a hint, a direction to the outer side
 
     Raises ValueError if nothing tells the outer side.
     """
-    points = np.vstack(list(strokes))
-    links = _links(points, planes, [len(stroke) for stroke in strokes])
+    links = _links(points, planes, stroke)
     links = _bridged(points, planes.normals, *links)
-    sides, region = _propagated_signs(points, planes.normals, *links)
+    sides, order, ends = _propagated_signs(points, planes.normals, *links)
     normals = sides[:, None] * planes.normals
-    flips, number = _winding_signs(points, normals, planes.areas, region)
-    normals *= flips[region, None]
+    turns, number = _winding_signs(points[order], normals[order], planes.areas[order], ends)
+    normals[order] *= turns[:, None]
     return normals * _global_sign(normals, known, up, number)
 
 
-def _links(points: Array, planes: Planes, lengths: Sequence[int]) -> tuple[Indices, Indices, Array]:
+def _links(points: Array, planes: Planes, stroke: Indices) -> tuple[Indices, Indices, Array]:
     """Pairs of neighbors and of successive contacts, (m,) each, and their weights (m,)."""
-    n = len(points)
-    i, j = np.repeat(np.arange(n), LINKS), planes.links.ravel()
-    ends = np.cumsum(lengths) - 1
-    before = np.setdiff1d(np.arange(n - 1), ends)
+    i, j = np.repeat(np.arange(len(points)), LINKS), planes.links.ravel()
+    before = np.flatnonzero(np.diff(stroke) == 0)
     step = np.linalg.norm(points[before + 1] - points[before], axis=1)
     before = before[step < STEP * planes.reach[before]]
     factor = np.repeat([1.0, STROKE], [len(i), len(before)])
@@ -182,77 +181,69 @@ def _bridged(
 
 def _propagated_signs(
     points: Array, normals: Array, i: Indices, j: Indices, weights: Array
-) -> tuple[Array, Indices]:
+) -> tuple[Array, Indices, Indices]:
     """The sides (n,), 1 or -1, of normals (n, 3) that follow from the first along the minimal tree of links.
 
-    Also the regions (n,) that uncertain links of the tree separate from each other.
+    Also the contacts (n,) in an order in which all that follow from one come after it, and where these end,
+    (n,).
     """
     from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
+    from scipy.sparse.csgraph import depth_first_order, minimum_spanning_tree
 
     n, (cosine, _) = len(points), reflection_agreement(points, normals, i, j)
     # Neighbors that have each other as a neighbor count twice, so they are more likely of one wall.
     votes = coo_matrix((cosine / weights, (np.minimum(i, j), np.maximum(i, j))), (n, n)).tocsr()
     votes.sum_duplicates()
     votes.data = 1.0 / np.maximum(np.abs(votes.data), LEAST_VOTE)
-    tree = minimum_spanning_tree(votes)
-    order, before = breadth_first_order(tree, 0, directed=False)
+    order, before = depth_first_order(minimum_spanning_tree(votes), 0, directed=False)
     cosine, _ = reflection_agreement(points, normals, before[order[1:]], order[1:])
-    sides = [1.0] * n
-    for at, past, same in zip(order[1:].tolist(), before[order[1:]].tolist(), cosine.tolist(), strict=True):
+    links = list(zip(order[1:].tolist(), before[order[1:]].tolist(), cosine.tolist(), strict=True))
+    sides, counts = [1.0] * n, [1] * n
+    for at, past, same in links:
         sides[at] = sides[past] if same > 0.0 else -sides[past]
-    return np.array(sides), _regions(tree.tocoo(), n)
+    for at, past, _ in reversed(links):
+        counts[past] += counts[at]
+    return np.array(sides), order, np.arange(n) + np.array(counts)[order]
 
 
-def _regions(tree: Any, n: int) -> Indices:
-    """The regions (n,) of a tree that its uncertain links separate; small ones join adjacent ones."""
-    certain = tree.data < CERTAIN
-    count, region = connected_pieces(tree.row[certain], tree.col[certain], n)
-    sizes, first = np.bincount(region).tolist(), list(range(count))
+def _winding_signs(points: Array, normals: Array, areas: Array, ends: Indices) -> tuple[Array, float]:
+    """The signs (n,) of contacts that bring winding numbers at contacts nearest to a half; their mean.
 
-    def of(one: int) -> int:
-        """The region that another is a part of by now."""
-        while first[one] != one:
-            one = first[one]
-        return one
+    On a closed surface the winding number is 1 inside, 0 outside and a half on it (Barill et al. 2018). One
+    link of the tree after another turns all that follows from it, or all else, as long as the mean square by
+    which winding numbers are off a half falls by CLEAR for each contact that is turned.
 
-    rest = np.flatnonzero(~certain)
-    for k in rest[np.argsort(tree.data[rest], kind="stable")].tolist():
-        a, b = of(int(region[tree.row[k]])), of(int(region[tree.col[k]]))
-        if a != b and min(sizes[a], sizes[b]) < SMALL * n:
-            first[max(a, b)] = min(a, b)
-            sizes[min(a, b)] = sizes[a] + sizes[b]
-    return np.unique([of(one) for one in range(count)], return_inverse=True)[1][region]
-
-
-def _winding_signs(points: Array, normals: Array, areas: Array, region: Indices) -> tuple[Array, float]:
-    """The signs (k,) of regions that bring winding numbers at contacts nearest to a half; their mean.
-
-    The sum of squares is minimized by coordinate descent over single regions and all of them, ROUNDS times.
-    On a closed surface the winding number is 1 inside, 0 outside and a half on it (Barill et al. 2018).
+    points, normals : (n, 3), in the order of the tree
+    ends : (n,), where what follows from each contact ends
     """
-    count = int(region.max()) + 1
-    rng = np.random.default_rng(0)
-    numbers, sizes = np.zeros((count, count)), np.bincount(region)
-    for one in range(count):
-        some = rng.permutation(np.flatnonzero(region == one))[:PROBES]
-        for at in some:
-            off = points - points[at]
-            away = np.maximum(np.linalg.norm(off, axis=1), np.sqrt(areas[at]))
-            angle = areas * row_dot(off, normals) / away**3
-            numbers[one] += np.bincount(region, angle, count) / (4.0 * np.pi * len(some))
-    sides = np.ones(count)
-
-    def off_half(sides: Array) -> float:
-        """The mean square by which winding numbers are off a half."""
-        return float(sizes @ (numbers @ sides - 0.5) ** 2)
-
-    best = off_half(sides)
-    for flipped in [*np.eye(count, dtype=bool), np.ones(count, dtype=bool)] * ROUNDS:
-        tried = np.where(flipped, -sides, sides)
-        if (off := off_half(tried)) < best * (1.0 - 1e-9):
-            sides, best = tried, off
-    return sides, float(sizes @ (numbers @ sides)) / len(points)
+    n = len(points)
+    counts = ends - np.arange(n)
+    starts = np.flatnonzero((counts >= SMALL * n) & (counts <= (1.0 - SMALL) * n) | (counts == n))
+    ends, counts = ends[starts], counts[starts]
+    probes = np.random.default_rng(0).permutation(n)[:PROBES]
+    numbers = np.zeros((len(probes), len(starts)))
+    for k, at in enumerate(probes):
+        off = points - points[at]
+        away = np.maximum(np.linalg.norm(off, axis=1), np.sqrt(areas[at]))
+        total = np.append(0.0, np.cumsum(areas * row_dot(off, normals) / away**3)) / (4.0 * np.pi)
+        numbers[k] = total[ends] - total[starts]
+    least = CLEAR * np.minimum(counts, n - counts) / n
+    turn = np.copysign(1.0, numbers[:, 0].mean())
+    numbers, signs = turn * numbers, np.full(n, turn)
+    while True:
+        rest = numbers[:, :1] - numbers
+        falls = np.stack([numbers * (rest - 0.5), rest * (numbers - 0.5)]).mean(axis=1) * 4.0
+        falls[falls < least] = 0.0
+        is_rest, best = np.unravel_index(np.argmax(falls), falls.shape)
+        if falls[is_rest, best] <= 1e-9:
+            return signs, float(numbers[:, 0].mean())
+        is_in = (starts >= starts[best]) & (ends <= ends[best])
+        is_around = (starts <= starts[best]) & (ends >= ends[best]) & ~is_in
+        numbers[:, is_around] -= 2.0 * numbers[:, [best]]
+        numbers[:, is_in] *= -1.0
+        signs[starts[best] : ends[best]] *= -1.0
+        if is_rest:
+            numbers, signs = -numbers, -signs
 
 
 def _global_sign(normals: Array, known: Array | None, up: Array | None, number: float) -> float:

@@ -39,7 +39,8 @@ def box(sizes, gap):
 def outward(strokes, **options):
     points = np.vstack(strokes)
     planes = planes_of(points, 0.0)
-    normals = oriented(strokes, planes, **options)
+    stroke = np.repeat(np.arange(len(strokes)), [len(some) for some in strokes])
+    normals = oriented(points, planes, stroke, **options)
     return normals, next(doubts_of(points, normals, planes), None)
 
 
@@ -75,8 +76,8 @@ def test_each_of_two_balls_faces_outward_and_a_hint_along_their_surface_changes_
         assert (np.einsum("ni,ni->n", normals, np.vstack([*one, *two]) - middles) > 0.0).all()
 
 
-def test_each_of_two_balls_faces_outward_with_a_gap_below_what_separates_their_contacts():
-    gap = 0.05
+@pytest.mark.parametrize("gap", [0.005, 0.01, 0.02, 0.05])
+def test_each_of_two_balls_faces_outward_with_a_gap_below_what_separates_their_contacts(gap):
     one, two = sphere(0.5, 0.1), sphere(0.5, 0.1, (1.0 + gap, 0.0, 0.0))
     middles = np.repeat([[0.0, 0.0, 0.0], [1.0 + gap, 0.0, 0.0]], sum(map(len, one)), axis=0)
     normals, _ = outward([*one, *two])
