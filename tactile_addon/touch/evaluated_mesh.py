@@ -114,8 +114,8 @@ def require_invertible(name: str, matrix: Array) -> None:
         raise ValueError(f'"{name}" has a location, rotation or scale that is not finite: set it again')
     if not np.linalg.cond(matrix[:3, :3]) < FLATTEST:  # NaN, as of zeros, fails every comparison.
         raise ValueError(
-            f'"{name}" has a scale of 0 in some direction, or {FLATTEST:g} times less than in another: give it '
-            "another scale"
+            f'"{name}" has a scale of 0 in some direction, or {FLATTEST:g} times less than in another: '
+            "give it another scale"
         )
 
 

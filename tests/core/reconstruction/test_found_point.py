@@ -112,4 +112,4 @@ def test_closed_curves_far_beside_their_point_bound_no_patch():
         tangent = (contour.points[-1] - contour.points[0]) / np.linalg.norm(np.ptp(contour.points, axis=0))
         circles.append(s.point + np.outer(np.sin(turn), tangent) - np.outer(1.0 - np.cos(turn), s.normal))
     with pytest.raises(core.DegenerateCurvesError, match="they bound no patch"):
-        core.reconstruct(s.point + [30.0, -100.0, 50.0], circles, outward=s.normal)
+        core.reconstruct(s.point + np.array([30.0, -100.0, 50.0]), circles, outward=s.normal)
