@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import SMALLEST, Array
-from ..contours.contour import Contour
+from ..contours.contour import Contour, unit_normals
 from ..contours.local_geometry import Frame
 from ..patch.monge import TERMS, monomials
 from .prior import FREE
@@ -77,8 +77,8 @@ def _turns(
     along = along[order]
     if contour.normals is None:
         return (x, y, *_turns_of_chords(along, local[order, 2], noise), False)
-    normals = contour.normals[order] @ frame.axes
-    # Normals may be of any length, and those of either side.
+    normals = unit_normals(contour.normals[order]) @ frame.axes
+    # Normals may be of either side.
     across = normals[:, 0] * x + normals[:, 1] * y
     angles = np.arctan2(np.copysign(1.0, normals[:, 2]) * across, np.abs(normals[:, 2]))
     # One contact alone that turns another way and back is an outlier.

@@ -74,14 +74,15 @@ def sextics(local: Array, weights: Array, expected: Array, normals: Array, point
     rows = np.empty((b, len(TERMS) + 1, n))
     rows[:, :-1] = monomials(local, TERMS).swapaxes(1, 2)
     np.subtract(local[..., 2], (expected[:, None] @ rows[:, :-1])[:, 0], out=rows[:, -1])
-    heights = (rows * weights[:, None]) @ rows.transpose(0, 2, 1)
-    pivot, offset = np.zeros((b, len(TERMS))), np.zeros(b)
+    squared, pivot, offset = rows, np.zeros((b, len(TERMS))), np.zeros(b)
     if point_std.any():
         total, share = weights.sum(axis=1), offset_share(weights, point_std)
         means = np.einsum("bin,bn->bi", rows, weights) / total[:, None]
-        heights -= (share * total)[:, None, None] * means[:, :, None] * means[:, None]
+        # Their squares are those of all rows less f W m m', without a difference that rounds.
+        squared = rows - ((1.0 - np.sqrt(1.0 - share))[:, None] * means)[..., None]
         rows -= (share[:, None] * means)[..., None]
         pivot, offset = share[:, None] * means[:, :-1], share / total
+    heights = (squared * weights[:, None]) @ squared.transpose(0, 2, 1)
     slopes = np.zeros_like(heights)
     if normals.size:
         partials, steepness = slope_equations(normals, local, weights)

@@ -14,6 +14,9 @@ from .arrays import read_array
 from .types import Array, Object, Point, Triple
 
 SHORT_SHARE = 0.05  # In most cases the mesh is within this share of the reach.
+FLATTEST = (
+    1e9  # Scales along the axes of an object differ by less, so that single precision holds its inverse.
+)
 FARTHEST_VERTEX = 1e15  # Vertices are no farther away, so that single precision can hold squared distances.
 
 
@@ -109,9 +112,11 @@ def require_invertible(name: str, matrix: Array) -> None:
     """Raises ValueError, with a sentence, if the transform (4, 4) is not finite or has no inverse."""
     if not np.isfinite(matrix).all():
         raise ValueError(f'"{name}" has a location, rotation or scale that is not finite: set it again')
-    linear = matrix[:3, :3]
-    if abs(np.linalg.det(linear)) <= 1e-9 * np.prod(np.linalg.norm(linear, axis=0)):
-        raise ValueError(f'"{name}" has a scale of 0 in some direction: give it another scale')
+    if not np.linalg.cond(matrix[:3, :3]) < FLATTEST:  # NaN, as of zeros, fails every comparison.
+        raise ValueError(
+            f'"{name}" has a scale of 0 in some direction, or {FLATTEST:g} times less than in another: '
+            "give it another scale"
+        )
 
 
 class PlacedMesh:

@@ -34,6 +34,8 @@ def finite_blocks(bpy):
 def mesh_state(mesh):
     arrays = []
     for name, layer in sorted(mesh.attributes.items()):
+        if name == "curvature_color":  # All patches of a mesh share one range of colors.
+            continue
         key = {
             "FLOAT_VECTOR": "vector",
             "FLOAT_COLOR": "color",

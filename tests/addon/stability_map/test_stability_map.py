@@ -452,6 +452,11 @@ def make_flat(bpy, obj):
     obj.scale.z = 0.0
 
 
+def make_thin(bpy, obj):
+    obj.scale.y = 1e-20  # Single precision makes 0 of it where a matrix becomes location, rotation and scale.
+    obj.rotation_euler = (0.3, 1.0, 0.0)
+
+
 def make_disabled(bpy, obj):
     obj.hide_viewport = True
 
@@ -474,6 +479,7 @@ def make_distant(bpy, obj):
         (make_infinite, "not finite"),
         (make_nowhere, "that is not finite: set it again"),
         (make_flat, "a scale of 0"),
+        (make_thin, "a scale of 0"),
         (make_disabled, "disabled in viewports"),
         (make_disabled_with_a_probe, "disabled in viewports"),
         (make_distant, "apart in single precision"),

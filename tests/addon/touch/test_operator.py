@@ -430,7 +430,7 @@ def zero_scale(bpy):
 
 
 def huge(bpy):
-    bpy.context.object.scale = (3e38, 3e38, 1.0)
+    bpy.context.object.scale = (3e38, 3e38, 3e38)
 
 
 def one_vertex_far_away(bpy):

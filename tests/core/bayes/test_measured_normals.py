@@ -388,6 +388,7 @@ def test_normals_of_any_length_and_along_the_tangent_plane_leave_finite_numbers(
     surface = surfaces.pear()
     contours = touched(surface)
     for normals in (
+        np.full_like(contours[0].normals, 1.7e308),
         1e300 * contours[0].normals,
         1e-300 * contours[0].normals,
         contours[0].points - surface.point + 1e-9,

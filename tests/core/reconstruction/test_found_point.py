@@ -103,3 +103,13 @@ def test_the_example_of_the_readme_is_not_surer_at_its_point_than_its_contacts()
     r = core.reconstruct(point, contacts.contours, outward=(0, 0, 1), strokes=contacts.strokes)
     assert r.status == "ok"
     assert 0.0 < r.height_std(0.0, 0.0) < r.mean_height_std
+
+
+def test_closed_curves_far_beside_their_point_bound_no_patch():
+    s, turn = surfaces.sphere(RADIUS), np.linspace(-np.pi, np.pi, 21)
+    circles = []
+    for contour in s.track(surfaces.planes((0, 60, 120)), extent=EXTENT, step=2.0):
+        tangent = (contour.points[-1] - contour.points[0]) / np.linalg.norm(np.ptp(contour.points, axis=0))
+        circles.append(s.point + np.outer(np.sin(turn), tangent) - np.outer(1.0 - np.cos(turn), s.normal))
+    with pytest.raises(core.DegenerateCurvesError, match="they bound no patch"):
+        core.reconstruct(s.point + np.array([30.0, -100.0, 50.0]), circles, outward=s.normal)
