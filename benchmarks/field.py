@@ -3,7 +3,7 @@
 """Whole objects of the YCB Object and Model Set: how near the touched surface is, beside two peers.
 
 `python -m benchmarks.field FOLDER [--only NAME] [--tolerance T]`, from the root of a checkout. FOLDER has
-meshes of YCB as .ply files (google_16k/nontextured.ply of each object, renamed), and pymeshlab makes one peer.
+meshes of YCB as .ply files (google_16k/nontextured.ply of each object, renamed); one peer needs pymeshlab.
 Objects are scaled to size 1, and contacts have a noise of .0005. The Markdown table has for each object
 
 - the touches, the contacts of curves and taps, the length of all curves in sizes, and CPU seconds;
@@ -11,8 +11,8 @@ Objects are scaled to size 1, and contacts have a noise of .0005. The Markdown t
 - Chamfer: the mean distance from object to surface and from surface to object, in permille of the size.
 
 The peers take the same contacts with the same exact normals: screened Poisson reconstruction, and a Gaussian
-process implicit surface with a Matern covariance of order 3/2. Each is at the setting with the best IoU, which
-its user would not know. The process gives no mesh here, so its distance is that from the object's points alone.
+process implicit surface with a Matern covariance of order 3/2. Each is at the setting with the best IoU,
+which its user would not know. The process makes no mesh here: its distance is that from the object alone.
 """
 
 import argparse
@@ -107,9 +107,7 @@ def touched(thing, tolerance):
 
 def length_of(found):
     """The length of all curves of explorations."""
-    return sum(
-        np.linalg.norm(np.diff(c.points, axis=0), axis=1).sum() for e in found for c in e.contours
-    )
+    return sum(np.linalg.norm(np.diff(c.points, axis=0), axis=1).sum() for e in found for c in e.contours)
 
 
 def row(path, tolerance):
@@ -137,12 +135,13 @@ def main():
     parser.add_argument("--tolerance", type=float, default=0.002, help="of the size (%(default)s)")
     options = parser.parse_args()
     rows = []
-    for path in sorted(options.folder.glob(f"*{options.only}*.ply")):
+    for path in sorted(p for p in options.folder.glob("*.ply") if options.only in p.stem):
         rows.append(row(path, options.tolerance))
         print(" | ".join(rows[-1]), flush=True)
     means = [f"{np.mean([float(cells[i]) for cells in rows]):.2f}" for i in range(7, 13)]
     rows.append(["mean", *6 * [""], *means])
-    head = "object|status|touches|contacts|length|s|open edges|IoU, %|Chamfer|Poisson: IoU|Chamfer|process: IoU|off"
+    head = "object|status|touches|contacts|length|s|open edges|IoU, %|Chamfer"
+    head += "|Poisson: IoU|Chamfer|process: IoU|off"
     table(head.split("|"), rows)
     print(f"Tolerance {options.tolerance:g} of the size; {machine('bpy', 'numpy', 'scipy', 'pymeshlab')}.")
 

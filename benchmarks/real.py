@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How near the fits come to real surfaces, and whether their intervals are true there.
 
-`python -m benchmarks.real [--points N] [--only fixed | automatic | choose | taps] [--chart]`, from the root
+`python -m benchmarks.real [--points N] [--only fixed | automatic] [--chart]`, from the root
 of a checkout. It needs bpy to read the scans and to cast rays, and scikit-learn for the Gaussian process. It
 prints Markdown tables:
 
@@ -41,7 +41,7 @@ from core.patch.monge import exponents, monomials
 from core.reconstruction import result, status
 from tools import blender
 
-from . import SCANS_FOLDER, machine, table
+from . import NO_SCANS, SCANS_FOLDER, machine, table
 from .peers import Fit, quadric_process, radial_basis
 
 PLANES, EXTENTS, STEPS = (3, 4, 5, 6), (32, 16, 8), 12
@@ -354,124 +354,10 @@ def automatic_table(rows):
     table(head.split("|"), [*lines, ["all", *(f"{v:.0f}" for v in total), "", ""]])
 
 
-# Constants, chosen without one scan each time --------------------------------------------------------
-
-
-SETTINGS = {
-    f"lengths {lengths}, tempered to {temper}, {near} near the point": {
-        "LENGTHS": np.array(lengths),
-        "POWER": temper,
-        "NEAR_POINT": near,
-    }
-    for lengths in ((0.4, 1.6), (0.3, 1.2), (0.4, 2.4))
-    for temper, near in ((0.15, 1.0), (0.1, 0.6))
-}
-
-
-def choose(scans, count):
-    """Prints for each scan the setting with the least interval score on the others.
-
-    Scores and errors are shares of those of the process; in the second table errors are shares of those of
-    the best peer on that scan, by the number of planes.
-    """
-    methods = {peer: METHODS[peer] for peer in PEERS}
-    methods |= {name: partial(ours, **v) for name, v in SETTINGS.items()}
-    scores = {scan.name: fixed_scores(scan, count, methods)[0] for scan in scans}
-
-    def share(name, setting):
-        return np.mean([of[setting].interval / of[PROCESS].interval for of in scores[name].values()])
-
-    rows, ratios = [], []
-    for name, of in scores.items():
-        others = {s: np.mean([share(other, s) for other in scores if other != name]) for s in SETTINGS}
-        best = min(others, key=others.__getitem__)
-        errors = np.mean([cell[best].error / cell[PROCESS].error for cell in of.values()])
-        covered = np.mean([cell[best].covered for cell in of.values()])
-        by_planes = [[cell for key, cell in of.items() if key[0] == planes] for planes in PLANES]
-        ratios.append(
-            [
-                np.mean([cell[best].error for cell in cells])
-                / min(np.mean([cell[peer].error for cell in cells]) for peer in PEERS)
-                for cells in by_planes
-            ]
-        )
-        rows.append(
-            [name, best, f"{others[best]:.3f}", f"{share(name, best):.3f}", f"{errors:.3f}", f"{covered:.2f}"]
-        )
-    table(
-        ["left out", "chosen on the others", "score there", "score here", "error here", "within"],
-        rows,
-        left=2,
-    )
-    table(
-        ["scan", *(f"{planes} planes" for planes in PLANES)],
-        [[name, *(f"{v:.2f}" for v in of)] for name, of in zip(scores, ratios, strict=True)]
-        + [["mean", *(f"{v:.2f}" for v in np.mean(ratios, axis=0))]],
-    )
-
-
-# Values of the taps' constants that are tried instead of what they are, one at a time.
-TAPS = {
-    "TOO_FAR_OFF": (5.0, 7.0, 14.0, 20.0),
-    "CONTRADICTING": (1.5, 3.0),
-    "NEAR_RIM": (0.9, 0.95),
-    "WITHIN": (0.5, 0.75),
-    "LARGE_GAP": (0.01, 0.04),
-    "TAPS_OFF": (0.01, 0.02),
-    "TOO_FAR": (3.0, 10.0),
-    "SMOOTH": (0.006, 0.012),
-    "ROUGH": (0.0085, 0.06),
-}
-ENOUGH_AREA = 0.99  # The least share of the largest area: less area costs more than it is worth.
-
-
-def choose_taps(scans, count):
-    """Prints for each scan the constants of the taps that the others choose.
-
-    Candidates are the settings with the fewest sure touches that are off by more than 5 deviations, and with
-    ENOUGH_AREA among these. The area is relative to that of the constants as they are, averaged over scans.
-    The candidate whose worst sure touch is off by the fewest deviations is chosen.
-    """
-    now = "as they are"
-    settings = {now: {}} | {f"{name} {v:g}": {name: v} for name, values in TAPS.items() for v in values}
-    rows = {}
-    for setting, values in settings.items():
-        with constants(**values):
-            rows[setting] = {scan.name: automatic_row(scan, count) for scan in scans}
-
-    def silent(setting, names):
-        return sum(rows[setting][name][5] for name in names)
-
-    def area(setting, names):
-        return np.mean([rows[setting][name][7] / rows[now][name][7] for name in names])
-
-    def worst(setting, names):
-        return max(rows[setting][name][11] for name in names)
-
-    def totals(setting, names):
-        sums = (sum(rows[setting][name][i] for name in names) for i in (0, 4, 5, 7))
-        return [*(f"{v:.0f}" for v in sums), f"{area(setting, names):.3f}", f"{worst(setting, names):.2f}"]
-
-    names = [scan.name for scan in scans]
-    head = ["sure", "off > 2 %", "> 5 deviations", "all areas", "share", "worst"]
-    print("Each setting is judged on all scans.\n")
-    table(["setting", *head], [[s, *totals(s, names)] for s in settings])
-    print("Each scan is judged with the setting that the others choose.\n")
-    lines = []
-    for left in [*([name] for name in names), []]:
-        others = [name for name in names if name not in left]
-        least = min(silent(s, others) for s in settings)
-        allowed = [s for s in settings if silent(s, others) == least]
-        enough = ENOUGH_AREA * max(area(s, others) for s in allowed)
-        best = min((s for s in allowed if area(s, others) >= enough), key=lambda s: worst(s, others))
-        lines.append([*(left or ["none"]), best, *totals(best, left or names)])
-    table(["left out", "chosen on the others", *head], lines, left=2)
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--points", type=int, default=100, help="of each scan (%(default)s)")
-    parser.add_argument("--only", choices=("fixed", "automatic", "choose", "taps"), help="only this part")
+    parser.add_argument("--only", choices=("fixed", "automatic"), help="only this part")
     parser.add_argument("--chart", action="store_true", help="draw the chart as well")
     parser.add_argument("--scan", default="", help="only scans with this in their names")
     parser.add_argument("--redraw", action="store_true", help="only draw docs/charts/real_surfaces.csv again")
@@ -483,13 +369,9 @@ def main():
         return real_chart.draw_rows(rows, caption)
     paths = [path for path in sorted(SCANS_FOLDER.glob("*.*")) if options.scan in path.stem]
     if not paths:
-        sys.exit(f"real: there are no scans in {SCANS_FOLDER}")
+        sys.exit(f"real: {NO_SCANS}")
     with blender.quiet():
         scans = [Scan(path) for path in paths]
-    if options.only == "choose":
-        return choose(scans, options.points)
-    if options.only == "taps":
-        return choose_taps(scans, options.points)
     if options.only != "automatic":
         scores, seconds = {}, defaultdict(list)
         for scan in scans:
