@@ -21,6 +21,7 @@ from pathlib import Path
 from time import process_time
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 import core
 from tests import solids
@@ -31,7 +32,7 @@ from .atlas_shapes import Made, scattered
 from .real import Scan
 from .whole import EDGE, NOISE, away, contacts_of, poisson, tree_of
 
-PLACES, POINTS, MARGIN = 20_000, 2500, 0.02
+PLACES, POINTS, MARGIN = 10_000, 2500, 0.02
 MOST_TOUCHES, MOST_CONTACTS = 1500, 1000  # A process takes this many contacts, evenly chosen.
 OFFSET = 0.01  # The distance of the places inside and outside that an implicit surface is fitted to.
 LENGTHS, DEPTHS, WEIGHTS = (0.1, 0.3, 1.0), (7, 8), (4.0, 10.0)
@@ -45,7 +46,7 @@ def implicit_process(points, normals, length):
     values = np.repeat([0.0, OFFSET, -OFFSET], len(points)) - 1.0  # Far from contacts f is 1: outside.
 
     def kernel(p, q):
-        d = np.sqrt(3.0) / length * np.linalg.norm(p[:, None] - q[None], axis=2)
+        d = np.sqrt(3.0) / length * cdist(p, q)
         return (1.0 + d) * np.exp(-d)
 
     weights = np.linalg.solve(kernel(where, where) + 1e-6 * np.eye(len(where)), values)
