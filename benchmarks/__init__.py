@@ -19,7 +19,7 @@ for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR"):
 ROOT = Path(__file__).resolve().parents[1]
 SCANS_FOLDER = Path(os.environ.get("TACTILE_SCANS", ROOT.parent / "shared" / "data" / "meshes"))
 NO_SCANS = (
-    f"there are no scans in {SCANS_FOLDER}: download the nine that docs/speed_and_accuracy.md lists into one "
+    f"there are no scans in {SCANS_FOLDER}: download the nine that benchmarks/SCANS.md lists into one "
     "folder, and name it by TACTILE_SCANS"
 )
 

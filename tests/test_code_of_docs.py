@@ -120,7 +120,7 @@ def test_samples_run(page, empty, command, folder):
 
 
 def test_the_sample_of_the_format_is_read(extension, tmp_path):
-    text = (ROOT / "docs" / "contact_data.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "contacts.md").read_text(encoding="utf-8")
     (sample,) = re.findall(r"^```\n(# Tactile Patch contacts.*?)^```", text, re.DOTALL | re.MULTILINE)
     (tmp_path / "sample.csv").write_text(sample)
     found = extension.tactile_addon.files.measured.read([str(tmp_path / "sample.csv")], "FILE", 1.0)

@@ -4,14 +4,13 @@
 
 `make figures` takes hours; `make figures ONLY=NAME` runs only the commands with NAME in their names, and
 `python -m tools.figures --fill` only fills the pages again. What a command prints is kept in
-docs/figures/NAME.txt, whose last line has the machine and the commit. No figure is typed in a page; pages have
-marks instead. HEAD is how the head of a printed table begins:
+docs/figures/NAME.txt, whose last line has the machine and the commit; docs/figures.md, the appendix, has all
+of it. No figure is typed in another page. Those have marks, where HEAD is how the head of a table begins:
 
-<!-- table NAME "HEAD" COLUMNS --> ... <!-- end -->  these columns of the table, from 1 on; all if none is named;
-                                                     "2=error" gives column 2 another head
-<!-- figure NAME "HEAD" "ROW" COLUMN -->...<!-- end -->  a cell; ROW is the first cell of the row, or min or max
-
-docs/figures.md, the appendix, has all tables and is written whole.
+- <!-- table NAME "HEAD" COLUMNS --> ... <!-- end --> shows these columns of the table, from 1 on, or all if
+  none is named; 2=error gives column 2 another head.
+- <!-- figure NAME "HEAD" "ROW" COLUMN -->...<!-- end --> shows one cell. ROW is the first cell of its row, or
+  min or max.
 """
 
 import argparse
@@ -83,8 +82,9 @@ TABLE = re.compile(r'(<!-- table (\w+) "([^"]*)"((?: \d+(?:=[^ >]+)?)*) -->\n).*
 FIGURE = re.compile(r'(<!-- figure (\w+) "([^"]*)" "([^"]*)" (\d+) -->)[^<]*(<!-- end -->)')
 HEAD = """# Figures
 
-This appendix has all tables that the benchmarks print. `make figures` makes it, and fills the tables of the other pages from it. The line below a table names
-the machine, the versions and the commit of the code; a later commit may give other figures. Times are comparable within a table only.
+This appendix has all tables that the benchmarks print. `make figures` makes it, and fills the tables of the
+other pages from it. The line below a table names the machine, versions and commit.
+A later commit may give other figures. Times are comparable within a table only.
 """
 
 
