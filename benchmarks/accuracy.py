@@ -255,17 +255,6 @@ def cramer_rao(case):
     return float(np.median(np.abs(draws).max(axis=0)))
 
 
-def noise_limit(case, surface):
-    """The mean |dz| (um) of a quadric with five terms fitted to the noise, with all higher terms known."""
-    contacts = np.vstack([c.points for c in case.contours]) - case.point
-    x, y, z = (contacts @ case.axes).T
-    there = above(surface, case.axes, case.kappas, np.column_stack([x, y]))
-    terms = exponents(1, 2)
-    b = np.linalg.lstsq(monomials(contacts @ case.axes, terms), z - there @ case.axes[:, 2], rcond=None)[0]
-    over = case.hold_out @ case.axes
-    return 1e3 * float(np.mean(np.abs(monomials(over, terms) @ b)))
-
-
 # Measures --------------------------------------------------------------------------------------------
 
 
@@ -294,7 +283,7 @@ def exact_scores(key):
     name, planes, noise, seed = key
     case = exact_case(name, planes, noise, 1000 * seed + list(SURFACES).index(name))
     scores = {m: score(fit(case), case) for m, fit in METHODS.items()}
-    return scores | {"Cramér-Rao": cramer_rao(case), "limit": noise_limit(case, SURFACES[name][0])}
+    return scores | {"Cramér-Rao": cramer_rao(case)}
 
 
 def random_scores(seed):
@@ -357,8 +346,7 @@ def error_table(scores, times):
     print("noise of 0, 0.02 and 0.1 mm. `mean` is over all surfaces, plane sets and noises alike. `worst` is")
     print("the error less 2 um over that of the quadric, in the worst case.\n")
     head = ["method", *(f"{p}, {n:g}" for p, n in CELLS), "mean", "worst", "fit, ms", "and hold-out"]
-    limit = [f"{median_of(scores, lambda s: s['limit'], *cell):.0f}" for cell in CELLS]
-    table(head, [*(row(m) for m in METHODS), ["five terms fitted to the noise", *limit, "", "", "", ""]])
+    table(head, [row(m) for m in METHODS])
 
 
 def frame_table(scores):
@@ -381,16 +369,6 @@ def frame_table(scores):
     ]
     bound = [f"{1e3 * median_of(scores, lambda s: s['Cramér-Rao'], plane, n):.2f}" for n in NOISES]
     table(head, [*rows, ["Cramér-Rao bound, degree 4", *bound, "", "", ""]])
-
-
-def interval_table(scores):
-    print(f"The share of the hold-out within the 90 % intervals of height_std ({BAYES}), and the median of")
-    print("the mean height_std over the mean |dz|.\n")
-    rows = []
-    for cell in CELLS:
-        of = [s[BAYES] for k, s in scores.items() if k[1:3] == cell]
-        rows.append([cell[0], f"{cell[1]:g}", *_interval(of)])
-    table(["planes", "noise", "covered", "width"], rows)
 
 
 def surface_table(scores):
@@ -462,7 +440,6 @@ def main():
         random = list(pool.map(random_scores, range(options.shapes), chunksize=4))
     error_table(exact, times)
     frame_table(exact)
-    interval_table(exact)
     surface_table(exact)
     random_table(random)
     print(f"Seeds {options.seeds}, {options.shapes} shapes; {machine('numpy', 'scipy')}.")

@@ -9,10 +9,7 @@ docs/charts/atlas.csv again:
 
 (a) each object at five tolerances: the numbers of touches and contacts, and CPU seconds; the distances of
     points of the object from the mesh, and the share of these points that the field's 90 % interval holds;
-    along the edges of the graph the angle between the normals of the two patches, once more at only those
-    points around which the object turns by less than 20 degrees, with their share; by how much the joined
-    surface and the object turn from .001 on one side of an edge to .001 on the other; the share of points
-    where K is alike within 90 %; and the topology of the mesh;
+    and the topology of the mesh;
 (b) on the ring and the egg, whose curvatures are known, the mean |K| and |H| at the vertices of the mesh, by
     how much the atlas's are off on average, and the angle defects of the same mesh, which are K as Gauss and
     Bonnet have it; the share of vertices within the 90 % intervals, and of those where both are unknown.
@@ -27,8 +24,6 @@ from time import process_time
 import numpy as np
 
 import core
-from core.atlas.dual_contouring import BAND
-from core.atlas.field import sheet_facing
 from tests import solids
 from tools import blender
 
@@ -40,9 +35,6 @@ from .whole import EDGE, NOISE, away, contacts_of, tree_of
 SCANS = ("pear", "lemon", "bottle", "asteroid", "stone")
 TOLERANCES = (0.016, 0.008, 0.004, 0.002, 0.001)
 POINTS, MOST = 2500, 1500
-CREASE, WITHIN = 20.0, 0.01  # There is a crease where the object turns by more degrees within this length.
-ACROSS = 0.001  # The distance from the edge of two patches at which normals are compared, on both sides.
-AROUND = 8  # The number of places on a ring of radius WITHIN where normals are compared.
 
 
 class Scanned:
@@ -58,24 +50,6 @@ class Scanned:
     def normals(self, points):
         """Normals of the scan where it is nearest to points (n, 3)."""
         return np.array([self.scan.tree.find_nearest(tuple(p))[1] for p in points])
-
-
-def turns(points, normals):
-    """By how many degrees (n,) an object's normals turn at most within WITHIN around points (n, 3)."""
-    at = normals(points)
-    e1 = np.cross(at, np.eye(3)[np.abs(at).argmin(axis=1)])
-    e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
-    e2, least = np.cross(at, e1), np.ones(len(points))
-    for t in 2.0 * np.pi * np.arange(AROUND) / AROUND:
-        around = normals(points + WITHIN * (np.cos(t) * e1 + np.sin(t) * e2))
-        least = np.minimum(least, np.einsum("ni,ni->n", at, around))
-    return np.degrees(np.arccos(np.clip(least, -1.0, 1.0)))
-
-
-def turns_across(points, ways, normals):
-    """By how many degrees normals turn from one side of points (n, 3) to the other, along ways (n, 3)."""
-    cosines = np.einsum("ni,ni->n", *(normals(points + side * ACROSS * ways) for side in (-1.0, 1.0)))
-    return np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
 
 
 class Exact:
@@ -124,35 +98,6 @@ def explored(thing, tolerance):
     return atlas, found, touched - start, process_time() - touched, mesh
 
 
-def agreeing(thing, atlas):
-    """How well neighboring patches agree along the edges of the graph, in five numbers.
-
-    They are the mean angle of normals across edges in degrees; the same off the creases of the object; the
-    share of points off creases; by how many degrees the joined surface and the object turn across edges, a
-    pair; and the share of points where K is alike within 90 %.
-    """
-    points = np.vstack([edge.curve for edge in atlas.edges])
-    angles = np.degrees(np.concatenate([edge.angle for edge in atlas.edges]))
-    alike = []
-    for edge in atlas.edges:
-        (one, other), stds = atlas.bends(edge)
-        alike += (np.abs(one - other) <= 1.645 * np.hypot(*stds)).tolist()
-    smooth = turns(points, thing.normals) < CREASE
-
-    def surface(at):
-        """Normals (n, 3) of the joined surface near points (n, 3): the field's, or those of the mesh."""
-        up, near = atlas.reference.normals[atlas.reference.feet(at)[1]], BAND * atlas.reference.indicator.cell
-        found = sheet_facing(atlas.charts, at, up, near)
-        return np.where(found.patch[:, None] < 0, up, found.normal)
-
-    some = points[np.random.default_rng(0).permutation(len(points))[:POINTS]]
-    up = surface(some)
-    ways = np.cross(up, np.random.default_rng(1).normal(size=up.shape))
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    across = [turns_across(some, ways, normals).mean() for normals in (surface, thing.normals)]
-    return angles.mean(), angles[smooth].mean(), smooth.mean(), across, np.mean(alike)
-
-
 def angle_defects(mesh):
     """K at the vertices (n,) of a mesh: what their angles lack of a whole turn, over a third of the area."""
     turns, areas = np.full(len(mesh.vertices), 2.0 * np.pi), np.zeros(len(mesh.vertices))
@@ -187,14 +132,9 @@ def row(thing, tolerance):
     within = np.mean(np.abs(distance[felt]) <= 1.645 * std[felt])
     shape = solids.topology(mesh.triangles)
     contacts = len(contacts_of(found, atlas.taps)[0])
-    angle, smooth, share, across, alike = agreeing(thing, atlas)
     cells = [thing.name, f"{1e3 * tolerance:g}", str(len(atlas.patches)), str(contacts)]
     cells += [f"{touching:.1f}", f"{meshing:.1f}", f"{100 * felt.mean():.1f}", three(off), f"{within:.2f}"]
     cells += [
-        f"{angle:.1f}",
-        f"{smooth:.1f} ({100 * share:.0f} %)",
-        f"{across[0]:.1f} / {across[1]:.1f}",
-        f"{alike:.2f}",
         f"{shape.open} / {shape.euler} / {shape.pieces}",
     ]
     return (
@@ -270,7 +210,7 @@ def main():
             numbers.append(number)
     head = "object|tolerance|touches|contacts|s touch, join|s mesh|% covered|mean / median / 95 %|within 90 %"
     table(
-        [*head.split("|"), "angle at edges", "off creases", "turn", "K alike", "open edges / Euler / pieces"],
+        [*head.split("|"), "open edges / Euler / pieces"],
         rows,
     )
     if bends:

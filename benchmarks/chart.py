@@ -108,7 +108,6 @@ METHODS = [
     _peer("GP Matérn", PROCESSES, "scikit-learn, nu = 5/2", peers.gaussian_process, "sklearn"),
     _peer("GP RBF", PROCESSES, "squared exponential", peers.gaussian_process, "sklearn", nu=np.inf),
     _peer("spline", SPLINES, "scipy, SmoothBivariateSpline", peers.smoothing_spline),
-    _peer("NURBS", SPLINES, "geomdl, rings by half curves", peers.nurbs, "geomdl"),
     _peer("Poisson+n", MESHES, "pymeshlab, with the true normals", peers.screened_poisson, "pymeshlab",
           true_normals=True),
     _peer("Poisson", MESHES, "normals estimated from the contacts", peers.screened_poisson, "pymeshlab",

@@ -157,35 +157,6 @@ def smoothing_spline(case, degree=2, misfit=5e-3):
     return _scaled_fit(r, lambda points: spline.ev(*points.T))
 
 
-def nurbs(case, samples=(25, 61)):
-    """The tensor product that interpolates rings and half curves.
-
-    The last three half curves are repeated before the first and the first four after the last, so that it
-    closes. Approximation by fewer control points came out worse, with noise as well. A ring of zero radius
-    has no parameters, so the innermost one has a thousandth of the next radius. Heights are linear between
-    samples.
-    """
-    from geomdl import fitting
-    from scipy.interpolate import LinearNDInterpolator
-
-    r, _, radius = _start(case)
-    halves = []
-    for contour in case.contours:
-        local = r.frame.to_local(contour.points) / radius
-        middle = len(local) // 2
-        halves += [local[:middle][::-1], local[middle + 1 :]]
-    halves.sort(key=lambda half: np.arctan2(half[-1, 1], half[-1, 0]))
-    halves = np.array(halves[-3:] + halves + halves[:4])
-    grid = np.concatenate([1e-3 * halves[:, :1], halves], axis=1).swapaxes(0, 1)
-    points, sizes = grid.reshape(-1, 3).tolist(), grid.shape[:2]
-    surface = fitting.interpolate_surface(points, *sizes, 3, 3)
-    around = fitting.compute_params_surface(points, *sizes)[1]
-    surface.sample_size_u, surface.sample_size_v = samples
-    surface.evaluate(start_u=0.0, stop_u=1.0, start_v=around[3], stop_v=around[-4])
-    dense = np.array(surface.evalpts)
-    return _scaled_fit(r, LinearNDInterpolator(dense[:, :2], dense[:, 2]))
-
-
 # Meshes ----------------------------------------------------------------------------------------------
 
 

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How near the fits come to real surfaces, and whether their intervals are true there.
 
-`python -m benchmarks.real [--points N] [--only fixed | automatic] [--chart]`, from the root
-of a checkout. It needs bpy to read the scans and to cast rays, and scikit-learn for the Gaussian process. It
-prints Markdown tables:
+`python -m benchmarks.real [--points N] [--only fixed | automatic] [--chart]`, from the root of a checkout. It
+needs bpy to read the scans and to cast rays, and scikit-learn for the Gaussian process. It prints Markdown
+tables:
 
 (a) Scans are touched without noise at random points (seeded, by area) with three to six planes, and half
     curves of 1/32, 1/16 and 1/8 of the object in twelve steps. The error is the mean |dz| over up to some 90
@@ -16,29 +16,24 @@ prints Markdown tables:
 
 All methods are judged above the domain and along the normal of the paper's frame, from which the peers start.
 `--chart`, without `--only`, also draws build/charts/real_surfaces.png, and `--redraw` only draws the numbers
-of docs/charts again. `--only choose` chooses the constants
-of the process for each scan on all others, and judges them on that one; `--only taps` does so with the
-constants of the taps.
+of docs/charts again.
 """
 
 import argparse
 import math
 import sys
 from collections import defaultdict
-from contextlib import contextmanager
 from functools import partial
 from statistics import median
 from time import process_time
 from typing import NamedTuple
+from unittest import mock
 
 import numpy as np
 
 from core import SamplingPlane, explore, reconstruct, track
-from core.bayes import evidence, kernel, process_fit
-from core.exploration import extent as extents
-from core.exploration import taps
+from core.bayes import process_fit
 from core.patch.monge import exponents, monomials
-from core.reconstruction import result, status
 from tools import blender
 
 from . import NO_SCANS, SCANS_FOLDER, machine, table
@@ -130,46 +125,24 @@ class Score(NamedTuple):
     interval: float = np.nan  # The score of the 90 % interval in ‰.
 
 
-@contextmanager
-def constants(**values):
-    """Sets constants of the process, the taps or the status within this context."""
-    modules = [
-        m
-        for m in (kernel, evidence, process_fit, result, extents, taps, status)
-        if any(hasattr(m, name) for name in values)
-    ]
-    if unknown := [name for name in values if not any(hasattr(m, name) for m in modules)]:
-        raise ValueError(f"no module has the constants {unknown}")
-    before = [{name: getattr(m, name) for name in values if hasattr(m, name)} for m in modules]
-    try:
-        for module, old in zip(modules, before, strict=True):
-            vars(module).update({name: values[name] for name in old})
-        yield
-    finally:
-        for module, old in zip(modules, before, strict=True):
-            vars(module).update(old)
-
-
 # Methods ---------------------------------------------------------------------------------------------
 
 
-def ours(touch, **values):
-    def within(function):
-        def called(*arguments, **options):
-            with constants(**values):
-                return function(*arguments, **options)
+def ours(touch):
+    r = reconstruct(touch.point, touch.contours, outward=touch.axes[:, 2])
+    return Fit(r.frame.axes, r.height, (r.patch.k1, r.patch.k2), r.height_std)
 
-        return called if values else function
 
-    r = within(reconstruct)(touch.point, touch.contours, outward=touch.axes[:, 2])
-    return Fit(r.frame.axes, within(r.height), (r.patch.k1, r.patch.k2), within(r.height_std))
+def without_process(touch):
+    with mock.patch.object(process_fit, "UNEXPLAINED_MISFIT", math.inf):
+        return ours(touch)
 
 
 OURS, SEXTIC, PROCESS = "bayes", "without process", "Matérn process on a quadric"
 # These settings were the best ones on the scans.
 METHODS = {
     OURS: ours,
-    SEXTIC: partial(ours, UNEXPLAINED_MISFIT=math.inf),
+    SEXTIC: without_process,
     "RBF thin plate": partial(radial_basis, kernel="thin_plate_spline", smoothing=1e-3),
     "RBF cubic": partial(radial_basis, kernel="cubic", degree=2, smoothing=1e-3),
     PROCESS: quadric_process,
@@ -265,14 +238,6 @@ def fixed_tables(scores):
         rows.append(fixed_row([f"{cell[0]}", f"1/{cell[1]}"], means))
     print("(a) Means over the scans, by planes and extent.\n")
     table(head, rows, left=2)
-    print("The same for each scan, as means over the extents.\n")
-    rows = []
-    for scan, of in scores.items():
-        for planes in PLANES:
-            there = [of[planes, extent] for extent in EXTENTS if (planes, extent) in of]
-            means = {m: Score(*np.mean([each[m] for each in there], axis=0)) for m in METHODS}
-            rows.append(fixed_row([scan, f"{planes}"], means))
-    table(["scan", *head[:1], *head[2:]], rows, left=2)
 
 
 def time_table(scores, seconds):
