@@ -88,6 +88,7 @@ def test_every_command_of_a_figure_is_there():
 def test_figures_are_those_that_commands_printed(page):
     text = page.read_text(encoding="utf-8")
     assert text == (figures.appendix() if page.name == "figures.md" else figures.filled(text))
+    assert not re.search("^ *<!-- figure", text, re.MULTILINE)  # It would end the paragraph.
 
 
 def test_a_mark_shows_columns_and_cells_of_what_was_printed(tmp_path, monkeypatch):
@@ -99,7 +100,7 @@ def test_a_mark_shows_columns_and_cells_of_what_was_printed(tmp_path, monkeypatc
     page = '<!-- table a "x | y" 1 3=the_last -->\nold\n<!-- end --> <!-- figure a "k" "k" 2 -->4<!-- end -->'
     page += '<!-- figure a "x" "max" 2 -->4<!-- end -->'
     assert re.sub("<!--.*?-->", "", figures.filled(page)) == (
-        "\n| x | the last |\n| --- | --: |\n| one | 7 |\n| two |  |\n 50.3"
+        "\n\n| x | the last |\n| --- | --: |\n| one | 7 |\n| two |  |\n\n 50.3"
     )
     assert figures.filled(figures.filled(page)) == figures.filled(page)
     with pytest.raises(ValueError, match="has no table whose head begins with: q"):

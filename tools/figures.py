@@ -135,7 +135,7 @@ def filled(text: str) -> str:
         lines = [[row[i] for i in columns] for row in rows]
         for at, (_, _, head) in enumerate(chosen):
             lines[0][at] = head.replace("_", " ") or lines[0][at]
-        return mark[1] + "".join(f"| {' | '.join(line)} |\n" for line in lines) + mark[5]
+        return mark[1] + "\n" + "".join(f"| {' | '.join(line)} |\n" for line in lines) + "\n" + mark[5]
 
     def figure(mark: re.Match[str]) -> str:
         rows, column = printed(mark[2], mark[3])[2:], int(mark[5]) - 1
