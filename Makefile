@@ -17,7 +17,7 @@ READY := $(VENV)/.ready
 PEERS := $(VENV)/.peers
 CLUSTER := $(VENV)/.cluster
 # Core's tests need no Blender, so any Python from 3.11 on will do.
-CORE := build/venv-core
+CORE := build/core-$(PYTHON_VERSION)
 SITE := build/site
 # The checkout as the package that Blender makes of it, whatever its folder is called: mypy imports from there.
 TYPED := build/typed/tactile_patch
@@ -138,10 +138,11 @@ $(SITE)/.ready: tools/site_requirements.txt
 	@$(SITE)/bin/python -m pip install --quiet --disable-pip-version-check --requirement $<
 	@touch $@
 
-$(CORE)/.ready: pyproject.toml
+$(CORE)/.ready: pyproject.toml tools/requirements.txt
 	@echo 'Installing numpy, scipy and pytest, in $(CORE): once.'
 	@'$(or $(PYTHON),python3)' -m venv $(CORE)
-	@$(CORE)/bin/python -m pip install --quiet --disable-pip-version-check . pytest pytest-xdist hypothesis
+	@$(CORE)/bin/python -m pip install --quiet --disable-pip-version-check \
+		--constraint tools/requirements.txt . pytest pytest-xdist hypothesis
 	@touch $@
 
 # One by one: a chart goes without a peer that is not made for this Python or system, or for Blender's numpy.
