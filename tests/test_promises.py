@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from core.atlas import measured as atlas_measured
-from core.atlas import object_atlas, touching
+from core.atlas import object_atlas, samples, touching
 from core.bayes import posterior
 from core.contours import common_point, curves, finger, thinning
 from core.exploration import extent, sampling_density, taps
@@ -25,7 +25,8 @@ def degrees(cosine):
 def of_the_add_on(module, name):
     """A number of a module that needs Blender, read from its text."""
     text = (ROOT / "tactile_addon" / f"{module}.py").read_text(encoding="utf-8")
-    return float(re.search(rf"^{name}\b[^=\n]*= ([\d.]+)", text, re.MULTILINE)[1])
+    number, share = re.search(rf"^{name}\b[^=\n]*= ([\d.]+)(?: / ([\d.]+))?", text, re.MULTILINE).groups()
+    return float(number) / float(share or 1.0)
 
 
 # A page, the words around each number there, and the numbers of the code. WORDS has # for a number.
@@ -46,6 +47,9 @@ PROMISES = [
     ("viewport", "the standard deviation by less than # %", 100 * sampling_density.NOTICEABLE),
     ("viewport", "expected to reduce the standard deviation by a tenth", 10 * extent.HELPS),
     ("viewport", "less than a twentieth of a second", 20 * of_the_add_on("probes/change_handlers", "CHEAP")),
+    ("viewport", "six in all at most", of_the_add_on("touch/settings", "MOST_PLANES") / 6),
+    ("viewport", "at most half the object's size", 2 * of_the_add_on("touch/touch_object", "FARTHEST_SHARE")),
+    ("maps", "is a quarter of the extent", 4 * of_the_add_on("stability_map/stability", "SPACING_SHARE")),
     ("patch", "accurate to # % of the radius", 100 * status.DOUBTFUL_STD),
     ("patch", "may be off by #°", math.degrees(status.DOUBTFUL_TURN)),
     ("patch", "off the surface by # of the standard deviation", result.MESH_SHARE),
@@ -54,6 +58,7 @@ PROMISES = [
     ("stability", "more than # % of the radius.", 100 * status.DOUBTFUL_WAVES),
     ("whole_objects", "# % of the surface is within the tolerance",
      100 * of_the_add_on("whole_object/object_report", "WITHIN_SHARE")),
+    ("whole_objects", "gaps thinner than # % of the size", 300 * samples.FINEST),
     ("whole_objects", "no place is more than three tolerances off", object_atlas.OFF_TOLERANCES / 3),
     ("whole_objects", "until their uncertainty is # % of their radius", 100 * atlas_measured.GROWN),
     ("whole_objects", "If more than # % of the contacts are more than five times", 100 * explained.FEW),
