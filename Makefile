@@ -16,6 +16,8 @@ VENV_PY := $(VENV)/bin/python
 READY := $(VENV)/.ready
 PEERS := $(VENV)/.peers
 CLUSTER := $(VENV)/.cluster
+# Core's tests need no Blender, so any Python from 3.11 on will do.
+CORE := build/core-$(PYTHON_VERSION)
 SITE := build/site
 # The checkout as the package that Blender makes of it, whatever its folder is called: mypy imports from there.
 TYPED := build/typed/tactile_patch
@@ -48,7 +50,7 @@ help:
 	@echo 'make dataset           touch some objects with two workers, tabulate and draw the results, in build'
 	@echo 'make test-cluster      check the types and run the tests of data sets, with Dask'
 	@echo 'make site              build the site of the documentation, in build/site/html'
-	@echo 'make figures [ONLY=X]  draw every picture of the documentation again that a command draws, or those named X'
+	@echo 'make figures [ONLY=X]  run all benchmarks of the documentation, or those named X, and fill its tables and pictures'
 	@echo 'make film              draw the moving picture of the README again'
 	@echo 'make lesson            draw the pictures of docs/lesson.md again'
 	@echo 'make sample            make examples/sample.blend again, in Blender 4.5'
@@ -68,8 +70,8 @@ test: $(ZIP) | $(TYPED)
 	$(VENV_PY) -m mypy -p tactile_patch.tactile_addon
 	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest $(BESIDE) -m "not long" --ignore tests/cluster
 
-test-core: $(READY)
-	$(VENV_PY) -m pytest $(BESIDE) -m "not long" --hypothesis-profile=quick tests/core/scan tests/core tests/test_rooms.py
+test-core: $(CORE)/.ready
+	$(CORE)/bin/python -m pytest $(BESIDE) -m "not long" --hypothesis-profile=quick tests/core/scan tests/core tests/test_rooms.py
 
 test-long: $(ZIP)
 	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest $(BESIDE) -m long --ignore tests/cluster $(TESTS)
@@ -85,17 +87,14 @@ fuzz: $(ZIP)
 	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest --hypothesis-profile=long \
 		--hypothesis-show-statistics tests/core/reconstruction/test_fuzz_core.py tests/addon/test_fuzz_operator.py
 
-chart: $(ZIP) $(PEERS)
+chart: $(PEERS)
 	$(VENV_PY) -m benchmarks.chart $(if $(QUICK),--quick)
-	$(VENV_PY) -m benchmarks.amount $(if $(QUICK),--quick)
-	$(VENV_PY) -m benchmarks.mesh_size $(ZIP) $(if $(QUICK),--quick)
 
 paper: $(ZIP) $(PEERS)
 	$(VENV_PY) -m benchmarks.paper $(ZIP)
 
-stability: $(ZIP) $(PEERS)
+stability: $(PEERS)
 	$(VENV_PY) -m benchmarks.stability
-	$(VENV_PY) -m benchmarks.refusals $(ZIP)
 
 site: $(SITE)/.ready
 	@NO_MKDOCS_2_WARNING=1 $(SITE)/bin/mkdocs build --quiet --strict
@@ -137,6 +136,13 @@ $(SITE)/.ready: tools/site_requirements.txt
 	@echo 'Installing what the site is made with, in $(SITE): once.'
 	@'$(or $(PYTHON),python3)' -m venv $(SITE)
 	@$(SITE)/bin/python -m pip install --quiet --disable-pip-version-check --requirement $<
+	@touch $@
+
+$(CORE)/.ready: pyproject.toml tools/requirements.txt
+	@echo 'Installing numpy, scipy and pytest, in $(CORE): once.'
+	@'$(or $(PYTHON),python3)' -m venv $(CORE)
+	@$(CORE)/bin/python -m pip install --quiet --disable-pip-version-check \
+		--constraint tools/requirements.txt . pytest pytest-xdist hypothesis
 	@touch $@
 
 # One by one: a chart goes without a peer that is not made for this Python or system, or for Blender's numpy.

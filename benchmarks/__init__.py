@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Commands that measure what the documentation claims: `python -m benchmarks.NAME`, in a checkout's root.
 
-Each process computes on one thread, except those of benchmarks.threads.
+Each process computes on one thread.
 """
 
 import os
@@ -17,8 +17,11 @@ for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR"):
     os.environ[f"{library}_NUM_THREADS"] = "1"  # numpy reads this once, on import.
 
 ROOT = Path(__file__).resolve().parents[1]
-# docs/scans.md says where the nine scans are from.
 SCANS_FOLDER = Path(os.environ.get("TACTILE_SCANS", ROOT.parent / "shared" / "data" / "meshes"))
+NO_SCANS = (
+    f"there are no scans in {SCANS_FOLDER}: download the nine that benchmarks/SCANS.md lists into one "
+    "folder, and name it by TACTILE_SCANS"
+)
 
 
 def commit():

@@ -9,7 +9,7 @@ left out where that is missing. The command prints Markdown tables for
 (b) random smooth closed shapes, a third of them touched at a hyperbolic point, six plane sets.
 
 The constants of the prior of "bayes" and the settings of the peers were chosen on (a); (b) is independent of
-that choice. `--choose` prints the errors by which the peers' settings were chosen.
+that choice.
 
 The error is the mean |dz| over some 300 points of the true surface above the domain. Each method is judged in
 the frame that it found itself, the peers in the paper's. Lengths are in mm, errors in micrometers.
@@ -21,7 +21,7 @@ from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 from statistics import median
-from time import perf_counter
+from time import process_time
 from typing import NamedTuple
 
 import numpy as np
@@ -32,7 +32,7 @@ from core.patch.monge import exponents, monomials
 from tests import surfaces
 
 from . import machine, table
-from .peers import Fit, gaussian_process, jet, quadric_process, radial_basis
+from .peers import Fit, gaussian_process, jet, radial_basis
 
 # Each surface with the extent of its half curves. The sizes make the peers' errors like those that were
 # measured on other surfaces when this fit was planned, so these surfaces are as hard as those.
@@ -213,7 +213,7 @@ def ours(case, **options):
     return Fit(r.frame.axes, r.height, (r.patch.k1, r.patch.k2), r.height_std)
 
 
-# These settings are the best, on average, of those that `--choose` tries.
+# These settings were the best, on average, of 32 that were tried (`--choose` at e20b52a).
 SPLINES = {
     "RBF thin plate": {"kernel": "thin_plate_spline", "degree": 2, "smoothing": 0.1},
     "RBF cubic": {"kernel": "cubic", "degree": 2, "smoothing": 0.03},
@@ -255,17 +255,6 @@ def cramer_rao(case):
     return float(np.median(np.abs(draws).max(axis=0)))
 
 
-def noise_limit(case, surface):
-    """The mean |dz| (um) of a quadric with five terms fitted to the noise, with all higher terms known."""
-    contacts = np.vstack([c.points for c in case.contours]) - case.point
-    x, y, z = (contacts @ case.axes).T
-    there = above(surface, case.axes, case.kappas, np.column_stack([x, y]))
-    terms = exponents(1, 2)
-    b = np.linalg.lstsq(monomials(contacts @ case.axes, terms), z - there @ case.axes[:, 2], rcond=None)[0]
-    over = case.hold_out @ case.axes
-    return 1e3 * float(np.mean(np.abs(monomials(over, terms) @ b)))
-
-
 # Measures --------------------------------------------------------------------------------------------
 
 
@@ -294,7 +283,7 @@ def exact_scores(key):
     name, planes, noise, seed = key
     case = exact_case(name, planes, noise, 1000 * seed + list(SURFACES).index(name))
     scores = {m: score(fit(case), case) for m, fit in METHODS.items()}
-    return scores | {"Cramér-Rao": cramer_rao(case), "limit": noise_limit(case, SURFACES[name][0])}
+    return scores | {"Cramér-Rao": cramer_rao(case)}
 
 
 def random_scores(seed):
@@ -313,11 +302,11 @@ def milliseconds():
         for name, method in METHODS.items():
             method(case)
             for _ in range(RUNS):
-                start = perf_counter()
+                start = process_time()
                 fit = method(case)
-                fits[name].append(perf_counter() - start)
+                fits[name].append(process_time() - start)
                 fit.height(*(case.hold_out @ fit.axes)[:, :2].T)
-                both[name].append(perf_counter() - start)
+                both[name].append(process_time() - start)
     return {name: (1e3 * median(fits[name]), 1e3 * median(both[name])) for name in METHODS}
 
 
@@ -357,8 +346,7 @@ def error_table(scores, times):
     print("noise of 0, 0.02 and 0.1 mm. `mean` is over all surfaces, plane sets and noises alike. `worst` is")
     print("the error less 2 um over that of the quadric, in the worst case.\n")
     head = ["method", *(f"{p}, {n:g}" for p, n in CELLS), "mean", "worst", "fit, ms", "and hold-out"]
-    limit = [f"{median_of(scores, lambda s: s['limit'], *cell):.0f}" for cell in CELLS]
-    table(head, [*(row(m) for m in METHODS), ["five terms fitted to the noise", *limit, "", "", "", ""]])
+    table(head, [row(m) for m in METHODS])
 
 
 def frame_table(scores):
@@ -381,46 +369,6 @@ def frame_table(scores):
     ]
     bound = [f"{1e3 * median_of(scores, lambda s: s['Cramér-Rao'], plane, n):.2f}" for n in NOISES]
     table(head, [*rows, ["Cramér-Rao bound, degree 4", *bound, "", "", ""]])
-
-
-CHOICES = {
-    **{
-        f"RBF {kernel}, degree {degree}, smoothing {s:g}": partial(
-            radial_basis, kernel=kernel, degree=degree, smoothing=s
-        )
-        for kernel, degree in (("thin_plate_spline", 1), ("thin_plate_spline", 2), ("cubic", 1), ("cubic", 2))
-        for s in (0.0, 1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0)
-    },
-    "Matérn process of the heights": gaussian_process,
-    "Matérn process of what a quadric leaves": quadric_process,
-}
-
-
-def choice_scores(key):
-    name, planes, noise, seed = key
-    case = exact_case(name, planes, noise, 1000 * seed + list(SURFACES).index(name))
-    return {m: score(fit(case), case) for m, fit in CHOICES.items()}
-
-
-def choice_table(scores):
-    """Prints the errors by which the peers' settings were chosen."""
-    print("The errors of the peers by their settings, as in (a); smoothing is scipy's, in unit radius.\n")
-    rows = []
-    for method in CHOICES:
-        cells = [[s[method].error for k, s in scores.items() if k[1:3] == cell] for cell in CELLS]
-        medians = [f"{median_score(scores, 'error', method, *cell):.0f}" for cell in CELLS]
-        rows.append([method, *medians, f"{np.mean([np.mean(cell) for cell in cells]):.1f}"])
-    table(["method", *(f"{p}, {n:g}" for p, n in CELLS), "mean"], rows)
-
-
-def interval_table(scores):
-    print(f"The share of the hold-out within the 90 % intervals of height_std ({BAYES}), and the median of")
-    print("the mean height_std over the mean |dz|.\n")
-    rows = []
-    for cell in CELLS:
-        of = [s[BAYES] for k, s in scores.items() if k[1:3] == cell]
-        rows.append([cell[0], f"{cell[1]:g}", *_interval(of)])
-    table(["planes", "noise", "covered", "width"], rows)
 
 
 def surface_table(scores):
@@ -478,7 +426,6 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=10, help="of the noise on exact surfaces (%(default)s)")
     parser.add_argument("--shapes", type=int, default=300, help="number of random shapes (%(default)s)")
-    parser.add_argument("--choose", action="store_true", help="print only the peers by their settings")
     options = parser.parse_args()
     keys = [
         (name, planes, noise, seed)
@@ -487,17 +434,12 @@ def main():
         for noise in NOISES
         for seed in range(options.seeds if noise else 1)
     ]
-    if options.choose:
-        with ProcessPoolExecutor() as pool:
-            choice_table(dict(zip(keys, pool.map(choice_scores, keys, chunksize=8), strict=True)))
-        return
     times = milliseconds()
     with ProcessPoolExecutor() as pool:
         exact = dict(zip(keys, pool.map(exact_scores, keys, chunksize=8), strict=True))
         random = list(pool.map(random_scores, range(options.shapes), chunksize=4))
     error_table(exact, times)
     frame_table(exact)
-    interval_table(exact)
     surface_table(exact)
     random_table(random)
     print(f"Seeds {options.seeds}, {options.shapes} shapes; {machine('numpy', 'scipy')}.")

@@ -1,60 +1,40 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whole objects: the error, touches and seconds of the surface of all touches, compared with peers.
+"""Whole objects: the error, touches and seconds of the surface of all touches.
 
-`python -m benchmarks.atlas [--only NAME] [--finest T] [--coarsest T] [--peers NAME]`, from the root of a
-checkout. It needs bpy to read the scans and to cast rays, and pymeshlab for three of the peers. Each object
-has the size 1, and contacts have a noise of .0005. The command draws build/charts/atlas.png and prints
-Markdown tables; with --redraw it only draws docs/charts/atlas.csv again:
+`python -m benchmarks.atlas [--only NAME] [--finest T] [--coarsest T]`, from the root of a checkout. It needs
+bpy to read the scans and to cast rays. Each object has the size 1, and contacts have a noise of .0005. The
+command draws build/charts/atlas.png and prints Markdown tables; with --redraw it only draws
+docs/charts/atlas.csv again:
 
 (a) each object at five tolerances: the numbers of touches and contacts, and CPU seconds; the distances of
     points of the object from the mesh, and the share of these points that the field's 90 % interval holds;
-    along the edges of the graph the angle between the normals of the two patches, once more at only those
-    points around which the object turns by less than 20 degrees, with their share; by how much the joined
-    surface and the object turn from .001 on one side of an edge to .001 on the other; the share of points
-    where K is alike within 90 %; and the topology of the mesh;
-(b) at tolerance .001 the CPU seconds of 100 touches with join and mesh, and those of 100 automatic touches
-    (explore_many with its defaults) at the same places in one batch;
-(c) peers on the contacts of tolerance .001 with the same normals, each at the best of its settings, and the
-    atlas and Poisson where normals are off by ten degrees;
-(d) as many touches at random places and at evenly spaced ones, in one batch, with the seconds of touching;
-(e) on the ring and the egg, whose curvatures are known, the mean |K| and |H| at the vertices of the mesh, by
+    and the topology of the mesh;
+(b) on the ring and the egg, whose curvatures are known, the mean |K| and |H| at the vertices of the mesh, by
     how much the atlas's are off on average, and the angle defects of the same mesh, which are K as Gauss and
     Bonnet have it; the share of vertices within the 90 % intervals, and of those where both are unknown.
 
 `--shapes [--starts N] [--first START] [--places N]` prints one other table instead: objects with creases,
 thin walls and several pieces, each from several starts (benchmarks.atlas_shapes).
-
-`--memory` touches the lemon up to 1000 times and prints how much memory that took at most.
 """
 
 import argparse
-import sys
-from itertools import product
 from time import process_time
 
 import numpy as np
 
 import core
-from core.atlas.dual_contouring import BAND
-from core.atlas.field import sheet_facing
-from core.atlas.touching import SIZE
 from tests import solids
 from tools import blender
 
 from . import SCANS_FOLDER, machine, table
 from .atlas_shapes import print_shapes
 from .real import Scan
-from .whole import EDGE, NOISE, away, cloud, contacts_of, matrices, poisson, put_together, spread, tree_of
+from .whole import EDGE, NOISE, away, contacts_of, tree_of
 
 SCANS = ("pear", "lemon", "bottle", "asteroid", "stone")
 TOLERANCES = (0.016, 0.008, 0.004, 0.002, 0.001)
-COMPARED, POINTS, MOST = 0.001, 2500, 1500
-FINE = 0.0002  # With this tolerance and noise 1000 touches are not enough.
-BLURRED = np.radians(10.0)  # The root mean square angle by which blurred normals are off.
-CREASE, WITHIN = 20.0, 0.01  # There is a crease where the object turns by more degrees within this length.
-ACROSS = 0.001  # The distance from the edge of two patches at which normals are compared, on both sides.
-AROUND = 8  # The number of places on a ring of radius WITHIN where normals are compared.
+POINTS, MOST = 2500, 1500
 
 
 class Scanned:
@@ -66,29 +46,10 @@ class Scanned:
         (self.start, self.outward), *_ = self.scan.places(1, 0)
         places = list(self.scan.places(POINTS, 1))
         self.points = np.array([point for point, _ in places])
-        self.random = np.array(places[: POINTS // 2])
 
     def normals(self, points):
         """Normals of the scan where it is nearest to points (n, 3)."""
         return np.array([self.scan.tree.find_nearest(tuple(p))[1] for p in points])
-
-
-def turns(points, normals):
-    """By how many degrees (n,) an object's normals turn at most within WITHIN around points (n, 3)."""
-    at = normals(points)
-    e1 = np.cross(at, np.eye(3)[np.abs(at).argmin(axis=1)])
-    e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
-    e2, least = np.cross(at, e1), np.ones(len(points))
-    for t in 2.0 * np.pi * np.arange(AROUND) / AROUND:
-        around = normals(points + WITHIN * (np.cos(t) * e1 + np.sin(t) * e2))
-        least = np.minimum(least, np.einsum("ni,ni->n", at, around))
-    return np.degrees(np.arccos(np.clip(least, -1.0, 1.0)))
-
-
-def turns_across(points, ways, normals):
-    """By how many degrees normals turn from one side of points (n, 3) to the other, along ways (n, 3)."""
-    cosines = np.einsum("ni,ni->n", *(normals(points + side * ACROSS * ways) for side in (-1.0, 1.0)))
-    return np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
 
 
 class Exact:
@@ -106,32 +67,10 @@ class Exact:
             hit = self.solid.ray_cast(tuple(rng.uniform(-0.6, 0.6, 3)), tuple(way / np.linalg.norm(way)), 2.0)
             points += [hit[0]] if hit else []
         self.points = np.array(points)
-        self.random = np.array([(p, self.solid.normal(*p)) for p in points[: POINTS // 2]])
 
     def normals(self, points):
         """Normals at points (n, 3) of the object."""
         return np.array([self.solid.normal(*p) for p in points])
-
-
-class Blurred:
-    """An object whose rays return normals that are off by BLURRED."""
-
-    def __init__(self, thing):
-        self.thing, self.rng = thing, np.random.default_rng(0)
-        self.name, self.start, self.outward, self.points, self.normals = (
-            thing.name,
-            thing.start,
-            thing.outward,
-            thing.points,
-            thing.normals,
-        )
-
-    def ray_cast(self, origin, direction, distance):
-        hit = self.thing.ray_cast(origin, direction, distance)
-        if hit is None:
-            return None
-        normal = np.add(hit[1], self.rng.normal(0.0, BLURRED / np.sqrt(2.0), 3))
-        return hit[0], tuple(normal / np.linalg.norm(normal))
 
 
 def off_mesh(vertices, triangles, points):
@@ -159,35 +98,6 @@ def explored(thing, tolerance):
     return atlas, found, touched - start, process_time() - touched, mesh
 
 
-def agreeing(thing, atlas):
-    """How well neighboring patches agree along the edges of the graph, in five numbers.
-
-    They are the mean angle of normals across edges in degrees; the same off the creases of the object; the
-    share of points off creases; by how many degrees the joined surface and the object turn across edges, a
-    pair; and the share of points where K is alike within 90 %.
-    """
-    points = np.vstack([edge.curve for edge in atlas.edges])
-    angles = np.degrees(np.concatenate([edge.angle for edge in atlas.edges]))
-    alike = []
-    for edge in atlas.edges:
-        (one, other), stds = atlas.bends(edge)
-        alike += (np.abs(one - other) <= 1.645 * np.hypot(*stds)).tolist()
-    smooth = turns(points, thing.normals) < CREASE
-
-    def surface(at):
-        """Normals (n, 3) of the joined surface near points (n, 3): the field's, or those of the mesh."""
-        up, near = atlas.reference.normals[atlas.reference.feet(at)[1]], BAND * atlas.reference.indicator.cell
-        found = sheet_facing(atlas.charts, at, up, near)
-        return np.where(found.patch[:, None] < 0, up, found.normal)
-
-    some = points[np.random.default_rng(0).permutation(len(points))[:POINTS]]
-    up = surface(some)
-    ways = np.cross(up, np.random.default_rng(1).normal(size=up.shape))
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    across = [turns_across(some, ways, normals).mean() for normals in (surface, thing.normals)]
-    return angles.mean(), angles[smooth].mean(), smooth.mean(), across, np.mean(alike)
-
-
 def angle_defects(mesh):
     """K at the vertices (n,) of a mesh: what their angles lack of a whole turn, over a third of the area."""
     turns, areas = np.full(len(mesh.vertices), 2.0 * np.pi), np.zeros(len(mesh.vertices))
@@ -201,7 +111,7 @@ def angle_defects(mesh):
 
 
 def curved(thing, tolerance, atlas, mesh):
-    """A row of the fifth table."""
+    """A row of the second table."""
     found, true = atlas.curvatures(mesh), thing.curvatures(mesh.vertices)
     known = np.isfinite(found["gaussian_curvature_std"])
     cells = [thing.name, f"{1e3 * tolerance:g}"]
@@ -214,7 +124,7 @@ def curved(thing, tolerance, atlas, mesh):
 
 
 def row(thing, tolerance):
-    """A row of the first table and of the fifth, the numbers that are drawn, and the explorations behind."""
+    """A row of the first table, the numbers that are drawn, and the rows of the second table."""
     atlas, found, touching, meshing, mesh = explored(thing, tolerance)
     distance, std = atlas.distance(thing.points)
     felt = np.isfinite(std)
@@ -222,151 +132,16 @@ def row(thing, tolerance):
     within = np.mean(np.abs(distance[felt]) <= 1.645 * std[felt])
     shape = solids.topology(mesh.triangles)
     contacts = len(contacts_of(found, atlas.taps)[0])
-    angle, smooth, share, across, alike = agreeing(thing, atlas)
     cells = [thing.name, f"{1e3 * tolerance:g}", str(len(atlas.patches)), str(contacts)]
     cells += [f"{touching:.1f}", f"{meshing:.1f}", f"{100 * felt.mean():.1f}", three(off), f"{within:.2f}"]
     cells += [
-        f"{angle:.1f}",
-        f"{smooth:.1f} ({100 * share:.0f} %)",
-        f"{across[0]:.1f} / {across[1]:.1f}",
-        f"{alike:.2f}",
         f"{shape.open} / {shape.euler} / {shape.pieces}",
     ]
     return (
         cells,
         (thing.name, 1e3 * tolerance, len(atlas.patches), round(touching + meshing, 2), round(off.mean(), 4)),
-        found,
-        atlas.taps,
         [curved(thing, tolerance, atlas, mesh)] if isinstance(thing, Exact) else [],
     )
-
-
-def moving_squares(points, normals, method, scale):
-    meshes = cloud(points, normals)
-    getattr(meshes, f"generate_marching_cubes_{method}")(filterscale=scale, resolution=150)
-    return matrices(meshes)
-
-
-def implicit_basis(points, normals, at, smoothing, offset=0.01):
-    """1000 |f| at places `at` (n, 3), where thin plate splines f take the values of an implicit function.
-
-    These are 0 at contacts, and +-offset at points that far from them along their normals.
-    """
-    from scipy.interpolate import RBFInterpolator
-
-    where = np.vstack([points, points + offset * normals, points - offset * normals])
-    values = np.repeat([0.0, offset, -offset], len(points))
-    return np.abs(RBFInterpolator(where, values, neighbors=60, smoothing=smoothing)(at)) * 1e3
-
-
-def implicit_process(points, normals, at, length, offset=0.01, most=700):
-    """|f| at points, where f is a process with Matérn covariance 3/2, by `most` of the contacts."""
-    some = np.linspace(0, len(points) - 1, min(most, len(points))).astype(int)
-    points, normals = points[some], normals[some]
-    where = np.vstack([points, points + offset * normals, points - offset * normals])
-    values = np.repeat([0.0, offset, -offset], len(points))
-
-    def kernel(p, q):
-        d = np.sqrt(3.0) / length * np.linalg.norm(p[:, None] - q[None], axis=2)
-        return (1.0 + d) * np.exp(-d)
-
-    noisy = kernel(where, where) + 1e-6 * np.eye(len(where))
-    weights = np.linalg.solve(noisy, values)
-    return np.abs(np.concatenate([kernel(part, where) @ weights for part in np.array_split(at, 20)])) * 1e3
-
-
-def peers(thing, found, taps, some=""):
-    """Rows of the third table, of the peers with `some` in their names."""
-    (points, normals), at = contacts_of(found, taps), thing.points
-
-    def meshed(method):
-        def run(*options):
-            return off_mesh(*method(points, normals, *options), at)
-
-        return run
-
-    tried = {
-        "screened Poisson": (meshed(poisson), list(product((7, 8), (4.0, 10.0)))),
-        "RIMLS": (meshed(moving_squares), [("rimls", s) for s in (4.0, 8.0)]),
-        "APSS": (meshed(moving_squares), [("apss", s) for s in (4.0, 8.0)]),
-        "RBF implicit": (lambda s: implicit_basis(points, normals, at, s), [(0.0,), (1e-6,), (1e-4,)]),
-        "GP implicit": (lambda s: implicit_process(points, normals, at, s), [(0.3,), (1.0,)]),
-    }
-    for name, (run, settings) in tried.items():
-        best = None
-        if some not in name:
-            continue
-        for setting in settings:
-            start = process_time()
-            try:
-                off = run(*setting)
-            except Exception as error:  # A filter may fail at one setting.
-                print(f"{name} {setting}: {error}", file=sys.stderr)
-                continue
-            if best is None or off.mean() < best[0].mean():
-                best = off, process_time() - start, setting
-        if best:
-            yield [thing.name, name, ", ".join(map(str, best[2])), three(best[0]), f"{best[1]:.1f}"]
-
-
-def by_hundred(thing, found, seconds):
-    """A row of the second table; `seconds` are those of all touches that were found, with join and mesh."""
-    points, outward = zip(*((e.result.frame.origin, e.result.frame.axes[:, 2]) for e in found), strict=True)
-    start = process_time()
-    core.explore_many(thing, points, outward, noise=NOISE, rng=0)
-    each = 100.0 / len(found)
-    return [thing.name, f"{each * seconds:.2f}", f"{each * (process_time() - start):.2f}"]
-
-
-def elsewhere(thing, which, where, tolerance):
-    """A row of the fourth table: touches at the random places with indices `which`; `where` names them."""
-    points, outward = thing.random[which, 0], thing.random[which, 1]
-    wanted = {"farthest": 0.3, "largest_std": SIZE * tolerance, "noise": NOISE, "rng": 0}
-    start = process_time()
-    found = [e for e in core.explore_many(thing, points, outward, **wanted) if not isinstance(e, ValueError)]
-    seconds = process_time() - start
-    atlas = put_together(found, tolerance)
-    mesh = atlas.mesh(EDGE)
-    covered = np.isfinite(atlas.distance(thing.points)[1]).mean()
-    off = off_mesh(mesh.vertices, mesh.triangles, thing.points)
-    return [thing.name, where, str(len(found)), f"{100 * covered:.1f}", three(off), f"{seconds:.1f}"]
-
-
-def compared(thing, found, taps, cells, tolerance, some):
-    """Rows of the third and of the fourth table.
-
-    If `some` names peers, there are only their rows, and only with the normals of the object as it is.
-    """
-    others = [[thing.name, "this atlas", f"{1e3 * tolerance:g} ‰", cells[7], cells[4]]]
-    others += peers(thing, found, taps, some)
-    if some:
-        return others, []
-    badly = Blurred(thing)
-    cells, _, again, more, _ = row(badly, tolerance)
-    others.append([thing.name, "this atlas, normals 10° off", f"{1e3 * tolerance:g} ‰", cells[7], cells[4]])
-    for line in peers(badly, again, more, "Poisson"):
-        others.append([line[0], f"{line[1]}, normals 10° off", *line[2:]])
-    count = min(len(found), len(thing.random))
-    even = spread(thing.random[:, 0], count)
-    return others, [
-        elsewhere(thing, slice(count), "random", tolerance),
-        elsewhere(thing, even, "evenly spaced", tolerance),
-    ]
-
-
-def print_memory():
-    """Prints the peak of memory during up to 1000 touches of the lemon, less that before them."""
-    import resource
-
-    with blender.quiet():
-        thing = Scanned("lemon")
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    atlas = core.explore_object(
-        thing, thing.start, thing.outward, tolerance=FINE, noise=FINE, most=1000, rng=0
-    )
-    atlas.mesh(EDGE)
-    took = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
-    print(f"{len(atlas.patches)} patches of at most 1000 touches, joined and meshed: {took:.0f} MB")
 
 
 NUMBERS = "At each dot is the tolerance, in ‰ of the size."
@@ -407,8 +182,6 @@ def main():
     parser.add_argument("--only", default="", help="only objects with this in their names")
     parser.add_argument("--finest", type=float, default=min(TOLERANCES), help="tolerance (%(default)s)")
     parser.add_argument("--coarsest", type=float, default=max(TOLERANCES), help="tolerance (%(default)s)")
-    parser.add_argument("--peers", default="", help="only peers with this in their names, and not (d)")
-    parser.add_argument("--memory", action="store_true", help="print only the memory that 1000 touches take")
     parser.add_argument("--shapes", action="store_true", help="print only the table of made objects")
     parser.add_argument("--starts", type=int, default=8, help="number of starts of each (%(default)s)")
     parser.add_argument("--first", type=int, default=0, help="the first of these starts (%(default)s)")
@@ -421,37 +194,25 @@ def main():
         caption, _, numbers = plot.stored("atlas")
         draw(numbers, caption)
         return
-    if options.memory:
-        print_memory()
-        return
     if options.shapes:
         starts = range(options.first, options.first + options.starts)
         print_shapes(options.only, (options.finest, options.coarsest), starts, options.places)
         return
     names = [name for name in (*SCANS, "ring", "egg") if options.only in name]
-    rows, hundreds, others, random, numbers, bends = [], [], [], [], [], []
+    rows, numbers, bends = [], [], []
     for name in names:
         with blender.quiet():
             thing = Scanned(name) if name in SCANS else Exact(name)
         for tolerance in (t for t in TOLERANCES if options.finest <= t <= options.coarsest):
-            cells, number, found, taps, curvatures = row(thing, tolerance)
+            cells, number, curvatures = row(thing, tolerance)
             rows.append(cells)
             bends += curvatures
             numbers.append(number)
-            if tolerance == COMPARED:
-                hundreds.append(by_hundred(thing, found, number[3]))
-                lines = compared(thing, found, taps, cells, tolerance, options.peers)
-                others += lines[0]
-                random += lines[1]
     head = "object|tolerance|touches|contacts|s touch, join|s mesh|% covered|mean / median / 95 %|within 90 %"
     table(
-        [*head.split("|"), "angle at edges", "off creases", "turn", "K alike", "open edges / Euler / pieces"],
+        [*head.split("|"), "open edges / Euler / pieces"],
         rows,
     )
-    table(["object", "s for 100 touches, join, mesh", "s for 100 automatic touches"], hundreds)
-    table(["object", "method", "setting", "mean / median / 95 %", "s"], others, left=3)
-    if random:
-        table(["object", "places", "touches", "% covered", "mean / median / 95 %", "s touch"], random, left=2)
     if bends:
         head = "object|tolerance|K|off|within 90 %|H|off|within 90 %|K of angle defects off|% unknown"
         table(head.split("|"), bends)

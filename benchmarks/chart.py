@@ -3,19 +3,16 @@
 """Speed against accuracy: each fit of this project, and what else one could take, on the same contacts.
 
 `python -m benchmarks.chart [--quick | --redraw]`, from the root of a checkout. A peer whose package is
-missing is left out with a message. With --redraw the stored tables of docs/charts are drawn again, which
-takes a minute. The command writes to build/charts
-
-speed_accuracy.png, .csv        from contacts to the heights of the hold-out: milliseconds and micrometers
-speed_accuracy_frame.png, .csv  normal and principal curvatures at the point: milliseconds, degrees and 1/mm
-
-for the exact surfaces, plane sets and noise levels of benchmarks.accuracy (`--quick` takes one plane set and
-one seed). The methods take turns, case by case, in one process on one thread.
+missing is left out with a message. With --redraw the stored table of docs/charts is drawn again. The command
+writes build/charts/speed_accuracy.png and .csv: milliseconds from contacts to the heights of the hold-out,
+and micrometers by which these are off, for the exact surfaces, plane sets and noise levels of
+benchmarks.accuracy (`--quick` takes one plane set and one seed). The methods take turns, case by case, in one
+process on one thread.
 """
 
 import argparse
 import sys
-from functools import partial
+from functools import cache, partial
 from importlib.util import find_spec
 from itertools import groupby
 from statistics import median
@@ -28,28 +25,24 @@ from core import SamplingPlane, explore, track
 from tools import blender
 
 from . import accuracy, machine, peers, plot
-from .amount import Remembering
 
 QUICK_PLANES = accuracy.EXACT_PLANES[:1]
 SEEDS = 4  # The number of seeds of the noise in the full run.
-RINGS = 25  # The number of rings of a dense mesh, which has 1951 vertices.
 REPEATED = 0.02  # A method that takes fewer seconds is run three times more, for a median.
 LEAST_COVERED = 0.9  # A surface that covers less of the hold-out has failed.
 SAME = ("d2", "d3", "d4", "d6")  # Degrees whose marks would cover that of "auto".
 HOLLOW = "(hollow)"  # The label of methods that get more data than the others, so they do not compete.
 # Distributions whose names differ from their modules'.
-DISTRIBUTIONS = {"sklearn": "scikit-learn", "igl": "libigl"}
-KAPPA, NORMAL = "kappa 1/mm", "normal degrees"
+DISTRIBUTIONS = {"sklearn": "scikit-learn"}
 TIME_LIMITS = (0.3, 300.0)  # The limits of the axes.
 OFF_SCALE = 400.0  # Errors above this many um are not to scale: a band at the top has their values.
-HEIGHT_LIMITS, KAPPA_LIMITS, NORMAL_LIMITS = (2.5, 1500.0), (5e-6, 0.3), (4e-4, 30.0)
+HEIGHT_LIMITS = (2.5, 1500.0)
 
 
 class Method(NamedTuple):
     """A method in a chart.
 
-    `run` maps a case of benchmarks.accuracy to a peers.Fit, or in the chart of frames a Touch to the normal
-    and both kappas.
+    `run` maps a case of benchmarks.accuracy to a peers.Fit.
     """
 
     label: str
@@ -64,8 +57,6 @@ class Method(NamedTuple):
 OURS, PAPER, INTERPOLATION = "bayes: this project's default", "the paper's fits", "interpolation"
 PROCESSES, SPLINES, MESHES = "Gaussian processes", "splines", "meshes"
 FIXED = "fixed degree, under the mark of auto"
-CONTACTS = "75 contacts on three curves"
-DENSE = "dense mesh: 1951 vertices with the same noise"
 LOOKS = {
     OURS: (plot.BLUE, "o"),
     PAPER: (plot.VERMILION, "s"),
@@ -73,12 +64,9 @@ LOOKS = {
     PROCESSES: (plot.PURPLE, "D"),
     SPLINES: (plot.ORANGE, "v"),
     MESHES: (plot.BLACK, "X"),
-    CONTACTS: (plot.BLUE, "o"),
-    DENSE: (plot.BLACK, "X"),
 }
 # Methods that do not look as the rest of their family.
 OWN_LOOKS = {
-    "paper": LOOKS[PAPER],
     "jet 3": LOOKS[INTERPOLATION],
     "jet 4": LOOKS[INTERPOLATION],
 }
@@ -120,7 +108,6 @@ METHODS = [
     _peer("GP Matérn", PROCESSES, "scikit-learn, nu = 5/2", peers.gaussian_process, "sklearn"),
     _peer("GP RBF", PROCESSES, "squared exponential", peers.gaussian_process, "sklearn", nu=np.inf),
     _peer("spline", SPLINES, "scipy, SmoothBivariateSpline", peers.smoothing_spline),
-    _peer("NURBS", SPLINES, "geomdl, rings by half curves", peers.nurbs, "geomdl"),
     _peer("Poisson+n", MESHES, "pymeshlab, with the true normals", peers.screened_poisson, "pymeshlab",
           true_normals=True),
     _peer("Poisson", MESHES, "normals estimated from the contacts", peers.screened_poisson, "pymeshlab",
@@ -128,45 +115,18 @@ METHODS = [
 ]  # fmt: skip
 
 
-def _curves(label, says, fit, **options):
-    def of(touch):
-        found = fit(touch.case, **options)
-        return found.axes[:, 2], found.kappas
+class Remembering:
+    """A surface that remembers the hit of each ray, because touches differ only in their noise."""
 
-    return Method(label, CONTACTS, of, says)
-
-
-def _mesh(label, says, curvature, *needs, radius=None, **options):
-    def of(touch):
-        given = options if radius is None else {"radius": radius * touch.extent}
-        return curvature(touch.vertices, touch.triangles, **given)
-
-    return Method(label, DENSE, of, says, needs)
-
-
-QUADRICS = "Quadric Fitting"
-FRAME_METHODS = [
-    _curves("bayes", "this project's default", accuracy.ours),
-    _curves("paper", "the paper's section III", accuracy.METHODS[accuracy.QUADRIC]),
-    *(_curves(f"jet {d}", "polynomial in the paper's frame, degree", peers.jet, degree=d) for d in (3, 4)),
-    *(_mesh(f"igl {r}", "libigl, quadric over this many rings", peers.igl_curvature, "igl", rings=r)
-      for r in (5, 10, 15)),
-    _mesh("meshlab q", f"pymeshlab, {QUADRICS}", peers.meshlab_curvature, "pymeshlab", method=QUADRICS),
-    _mesh("meshlab s", f"pymeshlab, Scale Dependent {QUADRICS}", peers.meshlab_curvature, "pymeshlab",
-          method=f"Scale Dependent {QUADRICS}"),
-    _mesh("trimesh", "trimesh, ball of two thirds of the extent", peers.trimesh_curvature, "trimesh", "rtree",
-          radius=2.0 / 3.0),
-]  # fmt: skip
+    def __init__(self, surface):
+        self.ray_cast = cache(surface.ray_cast)
 
 
 class Touch(NamedTuple):
-    """A case, contours in more planes through its point, and the surface around it as a mesh with noise."""
+    """A case, and contours in more planes through its point."""
 
     case: accuracy.Case
     contours: dict  # The contours by the number of planes.
-    vertices: np.ndarray  # The point comes first.
-    triangles: np.ndarray
-    extent: float  # The length of the half curves.
     explored: object  # A function: calls core.explore there, with this extent as the farthest.
 
 
@@ -174,7 +134,7 @@ class Result(NamedTuple):
     label: str
     noise: float
     ms: float
-    errors: tuple  # They are NaN where the method has failed.
+    error: float  # It is NaN where the method has failed.
 
 
 # Measurement -----------------------------------------------------------------------------------------
@@ -191,39 +151,15 @@ def touch_of(name, planes, noise, seed):
         azimuths = np.pi * np.arange(count) / count + np.radians(accuracy.TURN)
         sampling = [SamplingPlane(azimuth) for azimuth in azimuths]
         contours[count] = track(surface, case.point, case.axes[:, 2], sampling, rng=number, **lengths)
-    flat, triangles = in_rings(accuracy.domain_of(case.contours, case.point, case.axes, extent))
-    vertices = accuracy.above(surface, case.axes, case.kappas, flat)
-    offsets = np.random.default_rng(number).normal(0.0, noise, len(vertices))
-    offsets[0] = 0.0  # The point is exact, as in the contours.
     azimuths, tilts = (np.radians(angles) for angles in accuracy.PLANES[planes])
     sampling = [SamplingPlane(a + np.radians(accuracy.TURN), t) for a, t in zip(azimuths, tilts, strict=True)]
     sensor = {"farthest": extent, "tangent": case.axes[:, 0], "noise": noise, "rng": number}
     explored = partial(explore, remembering, case.point, case.axes[:, 2], sampling, **sensor)
-    vertices = vertices + np.outer(offsets, case.axes[:, 2])
-    return Touch(case, contours, vertices, triangles, extent, explored)
-
-
-def in_rings(domain):
-    """Points (1 + 3 RINGS (RINGS + 1), 2) and nearly equilateral triangles (6 RINGS^2, 3) over a domain.
-
-    Ring k has 6k points in equal turns.
-    """
-    points, triangles = [np.zeros((1, 2))], []
-    start, inner_start = 1, 0
-    for k in range(1, RINGS + 1):
-        points.append(k / RINGS * domain.boundary(6 * k))
-        outer = np.arange(6 * k)
-        # Outer point s of sector q stands between the inner points s - 1 and s of that sector.
-        sector, s = np.divmod(outer, k)
-        inner, before = (inner_start + (sector * (k - 1) + at) % max(6 * (k - 1), 1) for at in (s, s - 1))
-        triangles.append(np.column_stack([start + outer, start + (outer + 1) % (6 * k), inner]))
-        triangles.append(np.column_stack([start + outer, inner, before])[s > 0])
-        inner_start, start = start, start + 6 * k
-    return np.vstack(points), np.vstack(triangles)
+    return Touch(case, contours, explored)
 
 
 def fit_result(method, touch):
-    """Seconds, and (the mean |dz| in um,) over the part of the hold-out that the fit covers.
+    """Seconds, and the mean |dz| in um over the part of the hold-out that the fit covers.
 
     The error is NaN where that part is less than LEAST_COVERED.
     """
@@ -242,15 +178,7 @@ def fit_result(method, touch):
         touched()  # The surface now remembers the rays.
     seconds, miss = typical(heights)
     covered = np.isfinite(miss)
-    return seconds, (1e3 * np.abs(miss[covered]).mean() if covered.mean() >= LEAST_COVERED else np.nan,)
-
-
-def frame_result(method, touch):
-    """Seconds, and (the larger error of the kappas in 1/mm, the error of the normal in degrees)."""
-    seconds, (normal, kappas) = typical(lambda: method.run(touch))
-    axis = touch.case.axes[:, 2]
-    angle = np.arctan2(np.linalg.norm(np.cross(normal, axis)), normal @ axis)
-    return seconds, (np.abs(np.subtract(kappas, touch.case.kappas)).max(), np.degrees(angle))
+    return seconds, 1e3 * np.abs(miss[covered]).mean() if covered.mean() >= LEAST_COVERED else np.nan
 
 
 def typical(run):
@@ -270,15 +198,15 @@ def typical(run):
     return seconds, found
 
 
-def measure(methods, result, errors, touch):
+def measure(methods, touch):
     """The results of all methods on one touch; an exception is a failure."""
     for method in methods:
         try:
-            seconds, found = result(method, touch)
+            seconds, error = fit_result(method, touch)
         except Exception as problem:  # Peers raise exceptions of all kinds if they find nothing.
             print(f"{method.label}: {problem}", file=sys.stderr)
-            seconds, found = np.nan, (np.nan,) * errors
-        yield Result(method.label, touch.case.noise, 1e3 * seconds, found)
+            seconds, error = np.nan, np.nan
+        yield Result(method.label, touch.case.noise, 1e3 * seconds, error)
 
 
 def available(methods):
@@ -289,17 +217,17 @@ def available(methods):
     return [method for method in methods if not missing & set(method.needs)]
 
 
-def rows_of(methods, results, measures):
+def rows_of(methods, results):
     """Head and rows of the table, a row for each method and noise.
 
     Medians and quartiles are over the cases in which the method did not fail.
     """
     head = ["method", "family", "meaning", "noise mm", "planes", "cases", "failed share"]
-    head += [f"{measure} {part}" for measure in ("ms", *measures) for part in ("q1", "median", "q3")]
+    head += [f"{measure} {part}" for measure in ("ms", "um") for part in ("q1", "median", "q3")]
     rows = []
     for noise in accuracy.NOISES:
         for method in methods:
-            of = [(r.ms, *r.errors) for r in results if (r.label, r.noise) == (method.label, noise)]
+            of = [(r.ms, r.error) for r in results if (r.label, r.noise) == (method.label, noise)]
             good = [values for values in of if np.isfinite(values).all()] or [np.full(len(of[0]), np.nan)]
             failed = np.mean([not np.isfinite(values).all() for values in of])
             quartiles = np.quantile(good, (0.25, 0.5, 0.75), axis=0).T.ravel()
@@ -321,10 +249,10 @@ class Mark(NamedTuple):
     y: tuple
 
 
-def marks_of(table, noise, measure):
+def marks_of(table, noise):
     """Marks of the methods that did not always fail."""
     head, rows = table
-    time, error = (head.index(f"{what} q1") for what in ("ms", measure))
+    time, error = (head.index(f"{what} q1") for what in ("ms", "um"))
     return [
         Mark(row[0], row[1], HOLLOW in row[2], row[time : time + 3], row[error : error + 3])
         for row in rows
@@ -332,7 +260,7 @@ def marks_of(table, noise, measure):
     ]
 
 
-def panel(axes, marks, noise, limits, off_scale=np.inf):
+def panel(axes, marks, noise, limits, off_scale):
     """Draws marks with quartiles and labels; those off the scale are in a band at the top, with values."""
     axes.set(xscale="log", yscale="log", xlim=TIME_LIMITS, ylim=limits)
     axes.set_title(f"noise {noise:g} mm" if noise else "no noise")
@@ -371,13 +299,13 @@ def pareto(axes, marks):
     axes.plot(x, y, drawstyle="steps-post", color="#999999", lw=1.2, ls="--", zorder=1)
 
 
-def key(axes, methods, columns=False):
-    """Writes what the labels stand for, family by family: below each other, or in columns."""
+def key(axes, methods):
+    """Writes what the labels stand for, family by family."""
     axes.axis("off")
     families = [(family, list(of)) for family, of in groupby(methods, key=lambda method: method.family)]
     lines = []
     for i, (family, of) in enumerate(families):
-        line = 0 if columns else len(lines)
+        line = len(lines)
         lines.append((i, line, LOOKS[family], family, True))
         for j, (says, same) in enumerate(groupby(of, key=lambda method: method.says), 1):
             labels = [method.label for method in same]
@@ -385,11 +313,11 @@ def key(axes, methods, columns=False):
             lines.append((i, line + j, look, f"{_listed(labels)}: {says}", False))
     height = 1.0 / (1 + max(line for _, line, *_ in lines))
     for i, line, (color, shape), text, heading in lines:
-        x, y = i / len(families) if columns else 0.0, 1.0 - (line + 0.5) * height
+        y = 1.0 - (line + 0.5) * height
         look = {"color": plot.dark(color), "weight": "bold" if heading else "normal", "fontsize": 8}
-        axes.text(x + 0.04, y, text, transform=axes.transAxes, va="center", **look)
+        axes.text(0.04, y, text, transform=axes.transAxes, va="center", **look)
         if heading or (color, shape) != LOOKS[families[i][0]]:
-            axes.plot(x + 0.01, y, shape, color=color, ms=7.0, transform=axes.transAxes, clip_on=False)
+            axes.plot(0.01, y, shape, color=color, ms=7.0, transform=axes.transAxes, clip_on=False)
 
 
 def _listed(labels):
@@ -403,7 +331,7 @@ def draw_heights(table, methods, caption):
     figure.subplots_adjust(left=0.07, right=0.99, top=0.92, bottom=0.07, hspace=0.22, wspace=0.13)
     figure.suptitle("Surface patches from three curves: speed and accuracy", fontsize=12, weight="bold")
     for axes, noise in zip(grid.flat, accuracy.NOISES, strict=False):
-        marks = marks_of(table, noise, "um")
+        marks = marks_of(table, noise)
         panel(axes, marks, noise, HEIGHT_LIMITS, OFF_SCALE)
         pareto(axes, marks)
         axes.set_xlabel("time, ms")
@@ -411,30 +339,6 @@ def draw_heights(table, methods, caption):
         axes.set_ylabel("error of the height, µm")
     key(grid[1, 1], methods)
     plot.save(figure, "speed_accuracy", caption, *table)
-
-
-def draw_frame(table, methods, bounds, caption):
-    """bounds : {noise: the Cramér-Rao bound on the error of kappa, in 1/mm}"""
-    figure = plot.plt.figure(figsize=(8.6, 7.4))
-    edges = {"left": 0.08, "right": 0.99, "top": 0.9, "bottom": 0.02}
-    grid = figure.add_gridspec(3, 3, height_ratios=(1, 1, 0.34), hspace=0.34, wspace=0.08, **edges)
-    figure.suptitle("Normal and curvatures at the point: speed and accuracy", fontsize=12, weight="bold")
-    for j, noise in enumerate(accuracy.NOISES):
-        kappa, normal = (figure.add_subplot(grid[i, j]) for i in (0, 1))
-        panel(kappa, marks_of(table, noise, KAPPA), noise, KAPPA_LIMITS)
-        panel(normal, marks_of(table, noise, NORMAL), noise, NORMAL_LIMITS)
-        normal.set_xlabel("time, ms")
-        if j:
-            kappa.set_yticklabels([])
-            normal.set_yticklabels([])
-            kappa.axhline(bounds[noise], color="#777777", ls=":", lw=1.2)
-            look = {"ha": "center", "va": "top", "fontsize": 7, "color": "#555555"}
-            kappa.text(6.5, 0.92 * bounds[noise], "Cramér-Rao", **look)
-        else:
-            kappa.set_ylabel("larger of the errors of kappa, 1/mm")
-            normal.set_ylabel("error of the normal, degrees")
-    key(figure.add_subplot(grid[2, :]), methods, columns=True)
-    plot.save(figure, "speed_accuracy_frame", caption, *table)
 
 
 # Command ---------------------------------------------------------------------------------------------
@@ -448,21 +352,17 @@ def touches(quick):
                     yield touch_of(name, planes, noise, seed)
 
 
-def measured(methods, frame_methods, quick):
-    """The results for either chart, and {noise: the median of the Cramér-Rao bound in 1/mm}."""
-    heights, frames, bounds = [], [], {noise: [] for noise in accuracy.NOISES}
+def measured(methods, quick):
+    """The results of all touches."""
+    found = []
     with blender.quiet():  # One of MeshLab's filters prints to standard output.
         for i, touch in enumerate([touch_of("pear", QUICK_PLANES[0], 0.02, 0), *touches(quick)]):
-            of_heights = list(measure(methods, fit_result, 1, touch))
-            of_frames = list(measure(frame_methods, frame_result, 2, touch))
-            if i:  # The first touch is for warming up.
-                heights += of_heights
-                frames += of_frames
-                bounds[touch.case.noise].append(accuracy.cramer_rao(touch.case))
-    return heights, frames, {noise: float(np.median(of)) for noise, of in bounds.items()}
+            results = list(measure(methods, touch))
+            found += results if i else []  # The first touch is for warming up.
+    return found
 
 
-def captions(methods, quick):
+def caption_of(methods, quick):
     modules = {module for method in methods for module in method.needs}
     packages = sorted(DISTRIBUTIONS.get(module, module) for module in modules)
     sets, seeds = (1, 1) if quick else (len(accuracy.EXACT_PLANES), SEEDS)
@@ -475,24 +375,7 @@ def captions(methods, quick):
         "the contacts to the heights there, including the frame. Dashed: Pareto front, given three curves. "
         "Gray: off scale. "
     )
-    frame = (
-        "Time: libigl and pymeshlab compute all vertices, trimesh one; pymeshlab is called twice, because it "
-        "gives one kappa a call. The normal of a mesh is that of its vertex. Cramér-Rao: the bound of "
-        "unbiased fits of degree 4 to the contacts. "
-    )
-    known = f"On {machine('numpy', 'scipy', *packages)}."
-    return cases + heights + known, cases + frame + known
-
-
-def redraw():
-    """Draws the stored tables again; the bounds are not stored, so all touches are made once more."""
-    caption, *table = plot.stored("speed_accuracy")
-    draw_heights(table, METHODS, caption)
-    bounds = {noise: [] for noise in accuracy.NOISES}
-    for touch in touches(quick=False):
-        bounds[touch.case.noise].append(accuracy.cramer_rao(touch.case))
-    caption, *table = plot.stored("speed_accuracy_frame")
-    draw_frame(table, FRAME_METHODS, {noise: np.median(of) for noise, of in bounds.items()}, caption)
+    return f"{cases}{heights}On {machine('numpy', 'scipy', *packages)}."
 
 
 def main():
@@ -501,13 +384,12 @@ def main():
     parser.add_argument("--redraw", action="store_true", help="draw the tables of docs/charts again")
     options = parser.parse_args()
     if options.redraw:
-        redraw()
+        caption, *table = plot.stored("speed_accuracy")
+        draw_heights(table, METHODS, caption)
         return
-    methods, frame_methods = available(METHODS), available(FRAME_METHODS)
-    heights, frames, bounds = measured(methods, frame_methods, options.quick)
-    of_heights, of_frame = captions([*methods, *frame_methods], options.quick)
-    draw_heights(rows_of(methods, heights, ["um"]), methods, of_heights)
-    draw_frame(rows_of(frame_methods, frames, [KAPPA, NORMAL]), frame_methods, bounds, of_frame)
+    methods = available(METHODS)
+    results = measured(methods, options.quick)
+    draw_heights(rows_of(methods, results), methods, caption_of(methods, options.quick))
 
 
 if __name__ == "__main__":

@@ -2,9 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where the time goes when a probe follows the mouse: one live update, on a small and on a large mesh.
 
-`python -m benchmarks.live ZIP [--base ROOT]`, from the root of a checkout; ZIP is the built extension. With
---base it prints instead how much processor time a live update and the end of a gesture take here and in that
-checkout, whose extension must be built too; the two take turns (live_worker.py).
+`python -m benchmarks.live ZIP`, from the root of a checkout; ZIP is the built extension.
 
 A wavy sheet is touched once, so that Blender builds its tree of the faces. Then the first plane is turned by
 a degree again and again, as dragging its handle does. The Markdown table has medians in milliseconds on one
@@ -17,20 +15,42 @@ first touch, which builds that tree, and the end of a gesture, which measures th
 
 import argparse
 import math
-from contextlib import ExitStack
 from pathlib import Path
 from statistics import median
 from time import perf_counter
 
+import numpy as np
+
 from tools import blender
 
-from . import ROOT, machine, table
-from .live_worker import as_in_a_window, sheet
-from .ratios import answer, worker
+from . import machine, table
 
 FACES = (10_000, 1_000_000)
 UPDATES, ENDS = 101, 7
 STAGES = ("ray casts", "tracking", "fit", "mesh write", "all")
+
+
+def sheet(bpy, faces):
+    """A wavy sheet of about that many faces, the only object of the scene."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    side = math.isqrt(faces)
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=side, y_subdivisions=side, size=2.0)
+    obj = bpy.context.object
+    co = np.empty((len(obj.data.vertices), 3), dtype=np.float32)
+    obj.data.vertices.foreach_get("co", co.ravel())
+    co[:, 2] = 0.3 * np.sin(2.0 * co[:, 0]) * np.cos(1.5 * co[:, 1])
+    obj.data.vertices.foreach_set("co", co.ravel())
+    obj.data.update()
+    return obj
+
+
+def as_in_a_window(addon):
+    """Makes updates leave out what takes long, as in a drag; returns the function that ends the gesture."""
+    update = addon.probes.touch_again.update
+    addon.probes.change_handlers.update = lambda probe, depsgraph, complete: update(
+        probe, depsgraph, complete=False
+    )
+    return update
 
 
 class Clock:
@@ -85,31 +105,10 @@ def updates(probe, clock):
     return runs
 
 
-def compare(base):
-    """Prints a Markdown table of medians here and in the checkout `base`."""
-    with ExitStack() as stack:
-        pair = [stack.enter_context(worker("live_worker.py", root)) for root in (ROOT, base)]
-        rows = []
-        for faces in FACES:
-            firsts = [[answer(each, f"sheet {faces}") for each in pair]]
-            updates = [[answer(each, f"update {1 + i % 50}") for each in pair] for i in range(UPDATES)]
-            ends = [[answer(each, "end") for each in pair] for _ in range(ENDS)]
-            tasks = {"first touch": firsts, "live update": updates, "end of a gesture": ends}
-            for task, seconds in tasks.items():
-                ours, theirs = (1e3 * median(column) for column in zip(*seconds, strict=True))
-                rows.append([task, str(faces), f"{ours:.1f}", f"{theirs:.1f}", f"{ours / theirs:.2f}"])
-    table(["medians, ms", "faces", "this", "base", "this / base"], rows)
-    print(f"Processor time of {UPDATES} updates, {ENDS} ends; {machine('bpy')}.")
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("zip", type=Path, metavar="ZIP")
-    parser.add_argument("--base", type=Path, metavar="ROOT", help="a checkout to compare with")
     options = parser.parse_args()
-    if options.base:
-        compare(options.base)
-        return
     extension = blender.start(options.zip)
     import bpy
 

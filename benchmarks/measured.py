@@ -15,22 +15,14 @@ parallel planes, seeded. It prints Markdown tables:
 (b) with `--orientation`, every object of benchmarks.atlas_shapes, with gaps between strokes below half its
     thinnest wall, and 1.8 times as long: the share of contacts whose normals face outward, and the doubt. Of
     longer gaps it is that of the whole object if many normals are wrong without one of their own;
-(c) with `--touches N`, the time of `core.atlas_of` for N touches of the pebble of examples/robot.py, of three
-    curves each;
-(d) with `--features`, dents, bumps, grooves and steps of five heights from 10 to 100 noises on three objects:
+(c) with `--features`, dents, bumps, grooves and steps of five heights from 10 to 100 noises on three objects:
     the verdict, the share of the contacts in the feature that are off by more than five deviations and
-    noises, their mean distance in noises, and that of the others;
-(e) with `--robot N`, the touches of examples/robot.py with N seeds, and those of `explore_object`.
+    noises, their mean distance in noises, and that of the others.
 """
 
 import argparse
-import contextlib
-import importlib.util
-import io
 import sys
-import tempfile
 from itertools import product
-from pathlib import Path
 from time import process_time
 
 import numpy as np
@@ -350,58 +342,6 @@ def print_orientation(only, is_coarse):
     table([gaps, "wall", "contacts", "% outward", "doubt", "s"], rows)
 
 
-def example():
-    """The module of examples/robot.py, which knows the core by the name that pip gives it."""
-    sys.modules.setdefault("tactile_core", core)
-    spec = importlib.util.spec_from_file_location("robot", Path("examples") / "robot.py")
-    found = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(found)
-    return found
-
-
-def print_touches(count):
-    """The time of an atlas of `count` touches of the pebble, of three curves each."""
-    robot, k = example(), np.arange(count) + 0.5
-    across, turn = np.arccos(1.0 - 2.0 * k / count), np.pi * (1.0 + np.sqrt(5.0)) * k
-    ways = np.stack([np.cos(turn) * np.sin(across), np.sin(turn) * np.sin(across), np.cos(across)], axis=1)
-    planes = [core.SamplingPlane(a) for a in np.radians([0.0, 60.0, 120.0])]
-    options = {"extent": EXTENT, "step": EXTENT / 12, "noise": robot.NOISE, "rng": np.random.default_rng(0)}
-    contours = []
-    for point in ways * robot.HALF_AXES:
-        found = core.track(robot.Pebble(), point, point / robot.HALF_AXES**2, planes, **options)
-        contours += [core.Contour(c.points, noise=robot.NOISE) for c in found]
-    seconds = []
-    for _ in range(4):  # The first one imports what is needed.
-        start = process_time()
-        atlas = core.atlas_of(contours, tolerance=TOLERANCE)
-        seconds.append(process_time() - start)
-    contacts, patches = sum(len(c.points) for c in contours), len(atlas.patches)
-    row = [str(count), str(contacts), str(patches), atlas.status, f"{np.median(seconds[1:]):.2f}"]
-    table(["touches", "contacts", "patches", "status", "s"], [row])
-
-
-def print_robot(count):
-    """The touches of examples/robot.py with `count` seeds, and those of `explore_object` on its pebble."""
-    robot, rows = example(), []
-    for seed in range(count):
-        path = Path(tempfile.mkdtemp()) / "contacts.csv"
-        with contextlib.redirect_stdout(io.StringIO()):
-            atlas = robot.run(path, TOLERANCE, 60, seed)
-        touches = len(core.contacts_from_csv(path.read_text()).strokes) // 3
-        options = {"tolerance": TOLERANCE, "noise": robot.NOISE, "rng": seed}
-        others = len(core.explore_object(robot.Pebble(), robot.START, robot.OUTWARD, **options).patches)
-        ways = np.random.default_rng(1).normal(size=(PLACES, 3))
-        places = robot.HALF_AXES * ways / np.linalg.norm(ways, axis=1, keepdims=True)
-        distance, std = atlas.distance(places)
-        off, within = np.abs(distance).mean(), np.mean(np.abs(distance) <= 1.645 * std)
-        rows.append([
-            str(seed), atlas.status, str(touches), str(others), f"{touches / others:.2f}", f"{off:.3f}",
-            f"{within:.2f}",
-        ])  # fmt: skip
-    head = ["seed", "status", "touches", "explore_object", "ratio", "off, mm", "within 90 %"]
-    table(head, rows)
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--partial", type=int, default=0)
@@ -409,9 +349,7 @@ def main():
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--only", default="")
     parser.add_argument("--orientation", action="store_true")
-    parser.add_argument("--touches", type=int, default=0)
     parser.add_argument("--features", action="store_true")
-    parser.add_argument("--robot", type=int, default=0)
     options = parser.parse_args()
     for count, is_full in ((options.partial, False), (options.full, True)):
         if count:
@@ -419,12 +357,8 @@ def main():
     if options.orientation:
         for is_coarse in (False, True):
             print_orientation(options.only, is_coarse)
-    if options.touches:
-        print_touches(options.touches)
     if options.features:
         print_features(options.only, options.first)
-    if options.robot:
-        print_robot(options.robot)
     print(f"{machine('bpy', 'numpy', 'scipy')}.")
 
 

@@ -6,8 +6,7 @@
 installed, reads the scans and draws the pictures. The command prints Markdown:
 
 (a) Figures 3 and 4: a bottle's neck under no constraint and by TAGC, verified on nine more curves;
-(b) Table II: distances of contacts and of mesh vertices to the patches;
-(c) where our results and the paper's differ, and why.
+(b) Table II: distances of contacts and of mesh vertices to the patches.
 
 Table I and the two patches of Figures 3 and 4 are drawn to build/paper/*.jpg. Without the scans, only exact
 surfaces are touched. Lengths are in mm.
@@ -15,7 +14,6 @@ surfaces are touched. Lengths are in mm.
 
 import argparse
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -47,8 +45,6 @@ TABLE_II = (TAGC, QV, BAYES)
 NECK = "bottle neck"
 EXACT, SCAN = "exact", "scan"
 EXACT_NECK, SCANNED_NECK = "exact neck", "scanned neck"
-CONVEX = ("shell", "pebble")  # These exact surfaces are convex all over the patch.
-SHORT = 0.75  # The share of the extent at which the fit is repeated, to show the effect of the extent.
 
 
 class Figures(NamedTuple):
@@ -166,8 +162,6 @@ class Tested(NamedTuple):
     kind: str
     row: Row
     milliseconds: dict
-    shorter: Row  # Only TAGC, at a shorter extent.
-    alike: Row  # TAGC and QV, both with TAGC's weight.
 
 
 class Fit(NamedTuple):
@@ -176,10 +170,10 @@ class Fit(NamedTuple):
     milliseconds: float
 
 
-def fitted(place, method, seed, lean=0.0, **options):
+def fitted(place, method, seed, lean=0.0):
     curves = place.contours(AZIMUTHS, seed, lean)
     weight = {TAGC: place.weight, QV: QV_WEIGHT}.get(method)
-    options = {"outward": place.outward, "method": method, "weight": weight, "degree": 4} | options
+    options = {"outward": place.outward, "method": method, "weight": weight, "degree": 4}
     seconds, r = timed(core.reconstruct, place.point, curves, **options)
     return Fit(r, _in_frame(r, curves), 1e3 * seconds)
 
@@ -200,12 +194,12 @@ def figures(place, *methods, lean=0.0):
     return {method: np.array(rows) for method, rows in runs.items()}
 
 
-def table_row(place, *methods, **options):
+def table_row(place, *methods):
     """Medians over the seeds: a Row, and {method: milliseconds}."""
     runs = {method: [] for method in methods}
     for seed in range(SEEDS):
         for method in methods:
-            fit = fitted(place, method, seed, **options)
+            fit = fitted(place, method, seed)
             over = place.over(fit.result)
             distances = (core.distances(fit.result.patch, points).mean() for points in (fit.points, over))
             runs[method].append((len(fit.points), len(over), *distances, fit.milliseconds))
@@ -216,19 +210,7 @@ def table_row(place, *methods, **options):
 
 
 def tested_at(place, kind):
-    short = place._replace(extent=SHORT * place.extent)
-    alike, _ = table_row(place, TAGC, QV, weight=place.weight)
-    return Tested(place, kind, *table_row(place, *TABLE_II), table_row(short, TAGC)[0], alike)
-
-
-def true_curvature(surface, r):
-    """The total absolute curvature of the surface itself over the domain of a reconstruction, as in (8)."""
-    points, z = surfaces.heights_over(surface, r, 600)
-    total = 0.0
-    for point in r.frame.to_world(np.column_stack([points, z])):
-        axes, (k1, k2) = accuracy.darboux(replace(surface, point=point))
-        total += abs(k1 * k2) / (axes[:, 2] @ r.frame.axes[:, 2])
-    return total * r.domain.area / len(points)
+    return Tested(place, kind, *table_row(place, *TABLE_II))
 
 
 # Tables ------------------------------------------------------------------------------------------------
@@ -286,119 +268,6 @@ def _distances(row):
         f"{row.contacts / row.vertices:.2%}" if counted else "",
         f"{row.mesh}" if row.mesh else "",
     ]
-
-
-# Differences -------------------------------------------------------------------------------------------
-
-
-def print_differences(neck, measured, tested):
-    print("(c) Where we differ, and why\n")
-    kinds = dict.fromkeys(of.kind for of in tested)
-    for sentences in (
-        _on_the_curves(measured),
-        _between_the_curves(measured),
-        _curvature(neck, measured),
-        *(_distances_to_meshes(tested, kind) for kind in kinds),
-        _bend(tested),
-        _lambda(),
-        _time(neck),
-    ):
-        print(f"- {' '.join(sentences)}")
-    print()
-
-
-def _on_the_curves(measured):
-    three, nine, *_ = np.median(measured[EXACT_NECK][TAGC], axis=0)
-    paper = PAPER_FIGURES[TAGC]
-    yield f"**TAGC on the neck.** {three:.4f} mm on the three curves and {nine:.4f} mm on the nine are"
-    yield f"{three / paper.three:.2f} and {nine / paper.nine:.2f} times the paper's. Its point, called"
-    yield "parabolic there, is hyperbolic by its own curvatures, {:g} and {:g}.".format(*PAPER_CURVATURES)
-
-
-def _between_the_curves(measured):
-    off = {lean: np.median(measured[_leaning(lean)][LEAST_SQUARES][:, 1]) for lean in LEANS}
-    curvature = np.median(measured[EXACT_NECK][LEAST_SQUARES][:, 2])
-    paper = PAPER_FIGURES[LEAST_SQUARES]
-    nearest = min(LEANS, key=lambda lean: abs(np.log(off[lean] / paper.nine)))
-    yield "**No constraint.** A polynomial along three lines shows three numbers of each degree, so planes"
-    yield "through one line show three of the four cubic coefficients and three of the five quartic ones. The"
-    yield "other three come from how far the planes lean from the normal as it is found:"
-    yield f"the fit is off by {', '.join(f'{off[lean]:.3g} mm ({_degrees(lean)})' for lean in LEANS)}."
-    yield f"The paper's {paper.nine} mm is nearest to {_degrees(nearest)}; its planes are vertical, and it"
-    yield "does not tell how far from the normal that is. The total absolute curvature of the upright fit is"
-    yield f"{curvature / paper.curvature:.2f} times the paper's."
-
-
-def _curvature(neck, measured):
-    r, paper = fitted(neck, TAGC, 0).result, PAPER_FIGURES[TAGC].curvature
-    true, at_point = true_curvature(neck.surface, r), abs(np.prod(PAPER_CURVATURES))
-    tagc, bayes = (np.median(measured[EXACT_NECK][method][:, 2]) / true for method in (TAGC, BAYES))
-    area = paper / at_point
-    radius = np.sqrt(area / np.pi)
-    small = np.median(figures(neck._replace(extent=radius), TAGC)[TAGC][:, 2])
-    yield f"**Total absolute curvature.** The exact neck's own is {true:.3f} over the {r.domain.area:.0f}"
-    yield f"mm² of the patch; |k1 k2| of the point times the area is {at_point * r.domain.area:.3f}. TAGC"
-    yield f"makes it small and comes to {tagc:.2f} of it, bayes to {bayes:.2f}. The paper's {paper} is what"
-    yield f"its own curvatures have over {area:.0f} mm², a disk of radius {radius:.1f} mm; on curves of that"
-    yield f"length TAGC has {small:.4f}. The paper does not tell its extents."
-
-
-def _distances_to_meshes(tested, kind):
-    ours = [of for of in tested if of.kind == kind]
-    theirs = [PAPER_TABLE[of.place.name].to_vertices[TAGC] for of in ours]
-    ratios, shorter = (
-        [row.to_vertices[TAGC] / paper for row, paper in zip(rows, theirs, strict=True)]
-        for rows in ([of.row for of in ours], [of.shorter for of in ours])
-    )
-    to_bayes = [of.row.to_vertices[TAGC] / of.row.to_vertices[BAYES] for of in ours]
-    yield f"**Distances to the mesh, {kind}.** TAGC's are {_span(ratios)} times the paper's, on other"
-    yield f"objects; at {SHORT:g} of these extents they are {_span(shorter)} times the paper's. They are"
-    yield f"{_span(to_bayes)} times those of bayes. **What does not repeat:** TAGC is at least as near as QV,"
-    yield f"to contacts and to vertices, in {_nearer(PAPER_TABLE.values())} comparisons in the paper and in"
-    yield f"{_nearer(of.row for of in ours)} here. If QV has TAGC's weight, which is far from f = 0, it is in"
-    yield f"{_nearer(of.alike for of in ours)}."
-    vertices = [row.vertices for row in PAPER_TABLE.values() if row.vertices]
-    if kind == SCAN:
-        yield f"Our scans are coarser: they have {_span([of.row.vertices for of in ours], '.0f')} vertices"
-        yield f"under a patch, not {_span(vertices, '.0f')}. The paper's have an error of their own, up to"
-        yield "0.127 mm. The paper registers its patches onto the meshes, and what that leaves is in its"
-        yield "distances; ours are touched on the mesh itself, so registration is no part of this run."
-
-
-def _nearer(rows):
-    both = [d for row in rows for d in (row.to_contacts, row.to_vertices) if QV in d]
-    return f"{sum(distances[TAGC] <= distances[QV] for distances in both)} of {len(both)}"
-
-
-def _span(values, form=".2g"):
-    return f"{min(values):{form}} to {max(values):{form}}"
-
-
-def _bend(tested):
-    yield "**What TAGC does.** On a convex patch the total curvature is the area of its normals' image, and"
-    yield "the sectors between the curves are free to make that small:"
-    parts = []
-    for place in (of.place for of in tested if of.kind == EXACT and of.place.name in CONVEX):
-        r = fitted(place, TAGC, 0).result
-        over = place.over(r)
-        miss = r.patch.height(*over[:, :2].T) - over[:, 2]
-        share = r.total_absolute_curvature / true_curvature(place.surface, r)
-        off = f"off by {np.abs(miss).mean():.3f} mm, {miss.mean():+.3f} mm with the sign"
-        parts.append(f"the exact {place.name}'s patch has {share:.2f} of the surface's own and is {off}")
-    yield f"{'; '.join(parts)}."
-
-
-def _lambda():
-    yield "**Lambda** stays as it is. The paper updates it from step to step without saying how, and its text"
-    yield "takes the gradient of f + lambda g, where (9) is g + lambda f."
-
-
-def _time(neck):
-    runs = [[fitted(neck, TAGC, seed, solver=s).milliseconds for s in core.SOLVERS] for seed in range(SEEDS)]
-    quick, descent = np.median(runs, axis=0)
-    share = round(6e4 * PAPER_MINUTES / descent, -3)
-    yield f"**Time.** The paper's steepest descent takes {descent:.0f} ms here, Newton's {quick:.0f} ms,"
-    yield f"against the paper's {PAPER_MINUTES:.0f} minutes; the descent takes 1/{share:.0f} of these."
 
 
 # Pictures ----------------------------------------------------------------------------------------------
@@ -466,7 +335,6 @@ def main():
         print(f"All rows of scans and Table I are skipped, because there are no scans in {SCANS_FOLDER}.\n")
     print_figures(measured)
     print_table(tested)
-    print_differences(neck, measured, tested)
     print(f"Pictures: {paper_pictures.OUTPUT}/*.jpg" if draws else "No pictures: matplotlib is missing.")
 
 

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What people would use instead: peers that fit a surface to a case of benchmarks.accuracy, or take a mesh.
+"""What people would use instead: peers that fit a surface to a case of benchmarks.accuracy.
 
 Peers that fit the contacts start from the paper's frame, in unit radius. Where one needs a setting that its
 user would have to find, several were tried on the exact surfaces at all three noise levels, and the one that
-was best over these is used. Peers that take a mesh return the normal and both kappas at its first vertex.
+was best over these is used.
 Optional packages are imported where they are used.
 """
 
@@ -157,35 +157,6 @@ def smoothing_spline(case, degree=2, misfit=5e-3):
     return _scaled_fit(r, lambda points: spline.ev(*points.T))
 
 
-def nurbs(case, samples=(25, 61)):
-    """The tensor product that interpolates rings and half curves.
-
-    The last three half curves are repeated before the first and the first four after the last, so that it
-    closes. Approximation by fewer control points came out worse, with noise as well. A ring of zero radius
-    has no parameters, so the innermost one has a thousandth of the next radius. Heights are linear between
-    samples.
-    """
-    from geomdl import fitting
-    from scipy.interpolate import LinearNDInterpolator
-
-    r, _, radius = _start(case)
-    halves = []
-    for contour in case.contours:
-        local = r.frame.to_local(contour.points) / radius
-        middle = len(local) // 2
-        halves += [local[:middle][::-1], local[middle + 1 :]]
-    halves.sort(key=lambda half: np.arctan2(half[-1, 1], half[-1, 0]))
-    halves = np.array(halves[-3:] + halves + halves[:4])
-    grid = np.concatenate([1e-3 * halves[:, :1], halves], axis=1).swapaxes(0, 1)
-    points, sizes = grid.reshape(-1, 3).tolist(), grid.shape[:2]
-    surface = fitting.interpolate_surface(points, *sizes, 3, 3)
-    around = fitting.compute_params_surface(points, *sizes)[1]
-    surface.sample_size_u, surface.sample_size_v = samples
-    surface.evaluate(start_u=0.0, stop_u=1.0, start_v=around[3], stop_v=around[-4])
-    dense = np.array(surface.evalpts)
-    return _scaled_fit(r, LinearNDInterpolator(dense[:, :2], dense[:, 2]))
-
-
 # Meshes ----------------------------------------------------------------------------------------------
 
 
@@ -215,41 +186,3 @@ def screened_poisson(case, true_normals, neighbors=40):
     vertices = mesh.vertex_matrix()
     above = (mesh.vertex_normal_matrix()[:, 2] > 0.0) & (np.abs(vertices).max(axis=1) < 1.3)
     return _scaled_fit(r, LinearNDInterpolator(vertices[above, :2], vertices[above, 2]))
-
-
-# Peers on a dense mesh: the normal (3,) at its first vertex, and both kappas (2,) -----------------------
-
-
-def igl_curvature(vertices, triangles, rings):
-    """libigl's quadrics over this many rings (its default is 5), with normals weighted by angle."""
-    import igl
-
-    k1, k2 = igl.principal_curvature(vertices, triangles, rings)[2:4]
-    normals = igl.per_vertex_normals(vertices, triangles, igl.PER_VERTEX_NORMALS_WEIGHTING_TYPE_ANGLE)
-    return normals[0], np.sort([-k1[0], -k2[0]])
-
-
-def meshlab_curvature(vertices, triangles, method):
-    """A method of pymeshlab's filter, called twice for one kappa each; normals are weighted by angle."""
-    import pymeshlab
-
-    meshes = pymeshlab.MeshSet(verbose=False)
-    meshes.add_mesh(pymeshlab.Mesh(vertex_matrix=vertices, face_matrix=triangles))
-    kappas = []
-    for which in ("Min Curvature", "Max Curvature"):
-        meshes.compute_curvature_principal_directions_per_vertex(method=method, curvcolormethod=which)
-        kappas.append(-meshes.current_mesh().vertex_scalar_array()[0])
-    meshes.compute_normal_per_vertex(weightmode="By Angle")
-    return meshes.current_mesh().vertex_normal_matrix()[0], np.sort(kappas)
-
-
-def trimesh_curvature(vertices, triangles, radius):
-    """K and H from Cohen-Steiner and Morvan's curvature measures of a ball, over the area of its disk."""
-    import trimesh
-
-    mesh = trimesh.Trimesh(vertices, triangles, process=False)
-    area, ball = np.pi * radius**2, (mesh, vertices[:1], radius)
-    gaussian = trimesh.curvature.discrete_gaussian_curvature_measure(*ball)[0] / area
-    mean = -trimesh.curvature.discrete_mean_curvature_measure(*ball)[0] / area
-    half = np.sqrt(max(mean**2 - gaussian, 0.0))
-    return mesh.vertex_normals[0], np.array([mean - half, mean + half])

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How near the fits come to real surfaces, and whether their intervals are true there.
 
-`python -m benchmarks.real [--points N] [--only fixed | automatic | choose | taps] [--chart]`, from the root
-of a checkout. It needs bpy to read the scans and to cast rays, and scikit-learn for the Gaussian process. It
-prints Markdown tables:
+`python -m benchmarks.real [--points N] [--only fixed | automatic] [--chart]`, from the root of a checkout. It
+needs bpy to read the scans and to cast rays, and scikit-learn for the Gaussian process. It prints Markdown
+tables:
 
 (a) Scans are touched without noise at random points (seeded, by area) with three to six planes, and half
     curves of 1/32, 1/16 and 1/8 of the object in twelve steps. The error is the mean |dz| over up to some 90
@@ -16,32 +16,27 @@ prints Markdown tables:
 
 All methods are judged above the domain and along the normal of the paper's frame, from which the peers start.
 `--chart`, without `--only`, also draws build/charts/real_surfaces.png, and `--redraw` only draws the numbers
-of docs/charts again. `--only choose` chooses the constants
-of the process for each scan on all others, and judges them on that one; `--only taps` does so with the
-constants of the taps.
+of docs/charts again.
 """
 
 import argparse
 import math
 import sys
 from collections import defaultdict
-from contextlib import contextmanager
 from functools import partial
 from statistics import median
 from time import process_time
 from typing import NamedTuple
+from unittest import mock
 
 import numpy as np
 
 from core import SamplingPlane, explore, reconstruct, track
-from core.bayes import evidence, kernel, process_fit
-from core.exploration import extent as extents
-from core.exploration import taps
+from core.bayes import process_fit
 from core.patch.monge import exponents, monomials
-from core.reconstruction import result, status
 from tools import blender
 
-from . import SCANS_FOLDER, machine, table
+from . import NO_SCANS, SCANS_FOLDER, machine, table
 from .peers import Fit, quadric_process, radial_basis
 
 PLANES, EXTENTS, STEPS = (3, 4, 5, 6), (32, 16, 8), 12
@@ -130,46 +125,24 @@ class Score(NamedTuple):
     interval: float = np.nan  # The score of the 90 % interval in ‰.
 
 
-@contextmanager
-def constants(**values):
-    """Sets constants of the process, the taps or the status within this context."""
-    modules = [
-        m
-        for m in (kernel, evidence, process_fit, result, extents, taps, status)
-        if any(hasattr(m, name) for name in values)
-    ]
-    if unknown := [name for name in values if not any(hasattr(m, name) for m in modules)]:
-        raise ValueError(f"no module has the constants {unknown}")
-    before = [{name: getattr(m, name) for name in values if hasattr(m, name)} for m in modules]
-    try:
-        for module, old in zip(modules, before, strict=True):
-            vars(module).update({name: values[name] for name in old})
-        yield
-    finally:
-        for module, old in zip(modules, before, strict=True):
-            vars(module).update(old)
-
-
 # Methods ---------------------------------------------------------------------------------------------
 
 
-def ours(touch, **values):
-    def within(function):
-        def called(*arguments, **options):
-            with constants(**values):
-                return function(*arguments, **options)
+def ours(touch):
+    r = reconstruct(touch.point, touch.contours, outward=touch.axes[:, 2])
+    return Fit(r.frame.axes, r.height, (r.patch.k1, r.patch.k2), r.height_std)
 
-        return called if values else function
 
-    r = within(reconstruct)(touch.point, touch.contours, outward=touch.axes[:, 2])
-    return Fit(r.frame.axes, within(r.height), (r.patch.k1, r.patch.k2), within(r.height_std))
+def without_process(touch):
+    with mock.patch.object(process_fit, "UNEXPLAINED_MISFIT", math.inf):
+        return ours(touch)
 
 
 OURS, SEXTIC, PROCESS = "bayes", "without process", "Matérn process on a quadric"
 # These settings were the best ones on the scans.
 METHODS = {
     OURS: ours,
-    SEXTIC: partial(ours, UNEXPLAINED_MISFIT=math.inf),
+    SEXTIC: without_process,
     "RBF thin plate": partial(radial_basis, kernel="thin_plate_spline", smoothing=1e-3),
     "RBF cubic": partial(radial_basis, kernel="cubic", degree=2, smoothing=1e-3),
     PROCESS: quadric_process,
@@ -265,14 +238,6 @@ def fixed_tables(scores):
         rows.append(fixed_row([f"{cell[0]}", f"1/{cell[1]}"], means))
     print("(a) Means over the scans, by planes and extent.\n")
     table(head, rows, left=2)
-    print("The same for each scan, as means over the extents.\n")
-    rows = []
-    for scan, of in scores.items():
-        for planes in PLANES:
-            there = [of[planes, extent] for extent in EXTENTS if (planes, extent) in of]
-            means = {m: Score(*np.mean([each[m] for each in there], axis=0)) for m in METHODS}
-            rows.append(fixed_row([scan, f"{planes}"], means))
-    table(["scan", *head[:1], *head[2:]], rows, left=2)
 
 
 def time_table(scores, seconds):
@@ -354,124 +319,10 @@ def automatic_table(rows):
     table(head.split("|"), [*lines, ["all", *(f"{v:.0f}" for v in total), "", ""]])
 
 
-# Constants, chosen without one scan each time --------------------------------------------------------
-
-
-SETTINGS = {
-    f"lengths {lengths}, tempered to {temper}, {near} near the point": {
-        "LENGTHS": np.array(lengths),
-        "POWER": temper,
-        "NEAR_POINT": near,
-    }
-    for lengths in ((0.4, 1.6), (0.3, 1.2), (0.4, 2.4))
-    for temper, near in ((0.15, 1.0), (0.1, 0.6))
-}
-
-
-def choose(scans, count):
-    """Prints for each scan the setting with the least interval score on the others.
-
-    Scores and errors are shares of those of the process; in the second table errors are shares of those of
-    the best peer on that scan, by the number of planes.
-    """
-    methods = {peer: METHODS[peer] for peer in PEERS}
-    methods |= {name: partial(ours, **v) for name, v in SETTINGS.items()}
-    scores = {scan.name: fixed_scores(scan, count, methods)[0] for scan in scans}
-
-    def share(name, setting):
-        return np.mean([of[setting].interval / of[PROCESS].interval for of in scores[name].values()])
-
-    rows, ratios = [], []
-    for name, of in scores.items():
-        others = {s: np.mean([share(other, s) for other in scores if other != name]) for s in SETTINGS}
-        best = min(others, key=others.__getitem__)
-        errors = np.mean([cell[best].error / cell[PROCESS].error for cell in of.values()])
-        covered = np.mean([cell[best].covered for cell in of.values()])
-        by_planes = [[cell for key, cell in of.items() if key[0] == planes] for planes in PLANES]
-        ratios.append(
-            [
-                np.mean([cell[best].error for cell in cells])
-                / min(np.mean([cell[peer].error for cell in cells]) for peer in PEERS)
-                for cells in by_planes
-            ]
-        )
-        rows.append(
-            [name, best, f"{others[best]:.3f}", f"{share(name, best):.3f}", f"{errors:.3f}", f"{covered:.2f}"]
-        )
-    table(
-        ["left out", "chosen on the others", "score there", "score here", "error here", "within"],
-        rows,
-        left=2,
-    )
-    table(
-        ["scan", *(f"{planes} planes" for planes in PLANES)],
-        [[name, *(f"{v:.2f}" for v in of)] for name, of in zip(scores, ratios, strict=True)]
-        + [["mean", *(f"{v:.2f}" for v in np.mean(ratios, axis=0))]],
-    )
-
-
-# Values of the taps' constants that are tried instead of what they are, one at a time.
-TAPS = {
-    "TOO_FAR_OFF": (5.0, 7.0, 14.0, 20.0),
-    "CONTRADICTING": (1.5, 3.0),
-    "NEAR_RIM": (0.9, 0.95),
-    "WITHIN": (0.5, 0.75),
-    "LARGE_GAP": (0.01, 0.04),
-    "TAPS_OFF": (0.01, 0.02),
-    "TOO_FAR": (3.0, 10.0),
-    "SMOOTH": (0.006, 0.012),
-    "ROUGH": (0.0085, 0.06),
-}
-ENOUGH_AREA = 0.99  # The least share of the largest area: less area costs more than it is worth.
-
-
-def choose_taps(scans, count):
-    """Prints for each scan the constants of the taps that the others choose.
-
-    Candidates are the settings with the fewest sure touches that are off by more than 5 deviations, and with
-    ENOUGH_AREA among these. The area is relative to that of the constants as they are, averaged over scans.
-    The candidate whose worst sure touch is off by the fewest deviations is chosen.
-    """
-    now = "as they are"
-    settings = {now: {}} | {f"{name} {v:g}": {name: v} for name, values in TAPS.items() for v in values}
-    rows = {}
-    for setting, values in settings.items():
-        with constants(**values):
-            rows[setting] = {scan.name: automatic_row(scan, count) for scan in scans}
-
-    def silent(setting, names):
-        return sum(rows[setting][name][5] for name in names)
-
-    def area(setting, names):
-        return np.mean([rows[setting][name][7] / rows[now][name][7] for name in names])
-
-    def worst(setting, names):
-        return max(rows[setting][name][11] for name in names)
-
-    def totals(setting, names):
-        sums = (sum(rows[setting][name][i] for name in names) for i in (0, 4, 5, 7))
-        return [*(f"{v:.0f}" for v in sums), f"{area(setting, names):.3f}", f"{worst(setting, names):.2f}"]
-
-    names = [scan.name for scan in scans]
-    head = ["sure", "off > 2 %", "> 5 deviations", "all areas", "share", "worst"]
-    print("Each setting is judged on all scans.\n")
-    table(["setting", *head], [[s, *totals(s, names)] for s in settings])
-    print("Each scan is judged with the setting that the others choose.\n")
-    lines = []
-    for left in [*([name] for name in names), []]:
-        others = [name for name in names if name not in left]
-        least = min(silent(s, others) for s in settings)
-        allowed = [s for s in settings if silent(s, others) == least]
-        enough = ENOUGH_AREA * max(area(s, others) for s in allowed)
-        best = min((s for s in allowed if area(s, others) >= enough), key=lambda s: worst(s, others))
-        lines.append([*(left or ["none"]), best, *totals(best, left or names)])
-    table(["left out", "chosen on the others", *head], lines, left=2)
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--points", type=int, default=100, help="of each scan (%(default)s)")
-    parser.add_argument("--only", choices=("fixed", "automatic", "choose", "taps"), help="only this part")
+    parser.add_argument("--only", choices=("fixed", "automatic"), help="only this part")
     parser.add_argument("--chart", action="store_true", help="draw the chart as well")
     parser.add_argument("--scan", default="", help="only scans with this in their names")
     parser.add_argument("--redraw", action="store_true", help="only draw docs/charts/real_surfaces.csv again")
@@ -483,13 +334,9 @@ def main():
         return real_chart.draw_rows(rows, caption)
     paths = [path for path in sorted(SCANS_FOLDER.glob("*.*")) if options.scan in path.stem]
     if not paths:
-        sys.exit(f"real: there are no scans in {SCANS_FOLDER}")
+        sys.exit(f"real: {NO_SCANS}")
     with blender.quiet():
         scans = [Scan(path) for path in paths]
-    if options.only == "choose":
-        return choose(scans, options.points)
-    if options.only == "taps":
-        return choose_taps(scans, options.points)
     if options.only != "automatic":
         scores, seconds = {}, defaultdict(list)
         for scan in scans:

@@ -22,7 +22,6 @@ import argparse
 import math
 import sys
 import warnings
-from collections import defaultdict
 from functools import partial
 from pathlib import Path
 from statistics import median
@@ -64,7 +63,7 @@ class Score(NamedTuple):
 
 
 def explorations(folder):
-    """Yields (name, contacts (n, 3), force directions (n, 3)) of each exploration, in the order of time."""
+    """Yields (contacts (n, 3), force directions (n, 3)) of each exploration, in the order of time."""
     from matio import load_from_mat
 
     for path in sorted(Path(folder).rglob("exploration/*.mat")):
@@ -76,7 +75,7 @@ def explorations(folder):
         size = np.linalg.norm(force, axis=1)
         felt = size > LEAST_FORCE
         direction = force[felt] / size[felt, None]
-        yield path.stem, position[felt] - BALL * direction, direction
+        yield position[felt] - BALL * direction, direction
 
 
 def places(contacts, directions, count, radius):
@@ -248,29 +247,21 @@ def main():
     parser.add_argument("--points", type=int, default=20, help="of each exploration (%(default)s)")
     parser.add_argument("--radius", type=float, default=8.0, help="of a patch, in mm (%(default)s)")
     options = parser.parse_args()
-    scores, balls = defaultdict(list), []
-    for name, contacts, directions in explorations(options.folder):
+    every, balls = [], []
+    for contacts, directions in explorations(options.folder):
         for place in places(contacts, directions, options.points, options.radius):
             balls.append(ball_scores(place, options.radius))
             found = scores_at(place, options.radius)
             if found is not None:
-                scores[name].append(found)
-    if not scores:
+                every.append(found)
+    if not every:
         sys.exit(f"robot: there is no exploration/*.mat in {options.folder}")
-    every = [of for found in scores.values() for of in found]
     prefixes = [ALL, *list(PEERS)[:2]]
     prefixes += [f"{name}, {subset}" for name in KERNELS for subset in SUBSETS]
     named = {prefix: best(every, prefix) for prefix in prefixes}
     head = ["method", "places", "mean error, mm", "median", "error / expected", "within 90 %", "ms"]
     table(head, [row(name, every) for name in named.values()])
     table(head, [row(name, [of for of in every if CROSSED in of]) for name in (ALL, BOTH, CROSSED)])
-    peers = [name for name in named.values() if name in PEERS]
-    rows = []
-    for name, found in scores.items():
-        errors = {m: np.mean([of[m].error for of in found]) for m in [ALL, *peers]}
-        least = min(peers, key=errors.__getitem__)
-        rows.append([name, str(len(found)), f"{errors[ALL]:.3f}", f"{errors[least]:.3f}", least])
-    table(["exploration", "places", "only strokes, mm", "best peer, mm", "which"], rows)
     balls = [found for found in balls if found is not None]
     head = ["centers are moved", "places", "mean error, mm", "median", "ms"]
     rows = []

@@ -4,7 +4,7 @@
 
 `python -m benchmarks.stability [--seeds N]`, from the root of a checkout. One circumstance after the other is
 led from harmless to hopeless on exact surfaces, with every method. The command prints Markdown and writes
-build/charts/stability.png with four of the sweeps, stability_all.png with all, and stability.csv. With
+build/charts/stability.png with four of the sweeps, and stability.csv with all. With
 --redraw it draws docs/charts/stability.csv again, which takes seconds. Lengths are in mm.
 
 A warning or a refusal is due wherever
@@ -495,47 +495,40 @@ LOOKS = {  # color, line, letter
     "quadratic-variation": (plot.GREEN, "-.", "Q"),
     "least-squares": ("#777777", ":", "L"),
 }
-# The sweeps in the picture that stands in the documentation; it links the others.
+# The sweeps in the picture; its table has all.
 SHOWN = ("degrees between planes", "noise, of the extent", "outliers, of the contacts", "one curve cut to")
 ERRORS, CONDITIONS = (2e-5, 20.0), (10.0, 1e8)
+HEIGHT = 6.2  # Of the picture, in inches.
 
 
 def draw(rows, caption):
-    """Draws build/charts/stability.png, of SHOWN, and stability_all.png; writes stability.csv."""
-    shown = [sweep for sweep in SWEEPS if sweep.title in SHOWN]
-    plot.save(_sheet(rows, shown, 2, 6.2), "stability", caption, HEAD, rows)
-    plot.picture(_sheet(rows, SWEEPS, 3, 13.4), "stability_all", caption)
-
-
-def _sheet(rows, sweeps, columns, height):
-    """A figure, `height` inches high, with a panel for each sweep, and the key."""
-    figure = plot.plt.figure(figsize=(8.6, height))
+    """Draws build/charts/stability.png, with a panel for each sweep of SHOWN, and writes stability.csv."""
+    sweeps = [sweep for sweep in SWEEPS if sweep.title in SHOWN]
+    figure = plot.plt.figure(figsize=(8.6, HEIGHT))
     figure.suptitle(
         "Where reconstructions fail, and whether they say so",
         fontsize=12,
         weight="bold",
-        y=1.0 - 0.16 / height,
+        y=1.0 - 0.16 / HEIGHT,
     )
-    key_column = columns == 2  # The key has a column of its own or, in the large sheet, the last cell.
-    lines = -(-(len(sweeps) + (not key_column)) // columns)
     grid = figure.add_gridspec(
-        lines,
-        columns + key_column,
+        2,
+        3,
         left=0.08,
         right=0.99,
-        top=1.0 - 0.67 / height,
-        bottom=0.27 / height,
+        top=1.0 - 0.67 / HEIGHT,
+        bottom=0.27 / HEIGHT,
         hspace=0.45,
         wspace=0.2,
-        width_ratios=[1.0] * columns + [0.8] * key_column,
+        width_ratios=[1.0, 1.0, 0.8],
     )
     for number, sweep in enumerate(sweeps):
-        cell = grid[divmod(number, columns)].subgridspec(3, 1, height_ratios=(3, 1.2, 1.4), hspace=0.08)
+        cell = grid[divmod(number, 2)].subgridspec(3, 1, height_ratios=(3, 1.2, 1.4), hspace=0.08)
         axes = [figure.add_subplot(part) for part in cell]
         of = {m: [row for row in rows if (row[0], row[2]) == (sweep.title, m)] for m in METHODS}
-        panel(axes, sweep, of, number % columns == 0)
-    key(figure.add_subplot(grid[0, columns] if key_column else grid[divmod(len(sweeps), columns)]))
-    return figure
+        panel(axes, sweep, of, number % 2 == 0)
+    key(figure.add_subplot(grid[0, 2]))
+    plot.save(figure, "stability", caption, HEAD, rows)
 
 
 def panel(axes, sweep, of, first):

@@ -19,8 +19,8 @@ from .data_set.whole_options import WholeOptions
 from .engine import Engine, EngineError, connected
 from .extension import core
 from .input_files import KINDS, files_of
+from .progress import summary
 from .run import Run, StoppedError, summed_up
-from .summary import summary
 
 WRONG_WORDS, STOPPED, WITH_ERRORS, INTERRUPTED = 2, 1, 3, 130  # The exit codes.
 

@@ -1,19 +1,22 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a run is, in one line, which is overwritten on a terminal and repeated now and then elsewhere."""
+"""What a run prints: now and then how far it is, and at the end how much there is and what went wrong."""
 
 import sys
 from time import monotonic
+from typing import Any
 
-SAY_EVERY = {True: 0.5, False: 10.0}  # Seconds between lines, by whether they go to a terminal.
+from .data_set.columns import COUNTS
+
+SAY_EVERY = 10.0  # Seconds between lines.
+MOST_NAMED = 10  # At most this many objects with errors are named.
 
 
 class Progress:
-    """Counts touches or surfaces, of which `total` are to be made, and prints how many are made a second."""
+    """Counts touches or surfaces, of which `total` are to be made."""
 
     def __init__(self, noun: str) -> None:
         self.noun = noun
-        self._is_terminal, self._width = sys.stderr.isatty(), 0
         self.begin(0)
 
     def begin(self, total: int) -> None:
@@ -27,44 +30,35 @@ class Progress:
         return self.done / max(monotonic() - self.start, 1e-9)
 
     def add(self, done: int, errors: int, workers: int) -> None:
-        """Notes that more are done, and prints the line if it is time."""
+        """Notes that more are done, and prints a line such as "1,200 of 9,000 touches, 80 a second, ..."."""
         self.done, self.errors = self.done + done, self.errors + errors
-        if monotonic() - self._said >= SAY_EVERY[self._is_terminal] or self.done == self.total:
-            self._said = monotonic()
-            self._say(self.line(workers))
-
-    def line(self, workers: int) -> str:
-        """A sentence such as "1,200 of 9,000 touches, 80 a second on 2 workers, 2 min left, 3 errors"."""
-        left = (self.total - self.done) / self.rate if self.done else 0.0
-        words = [
-            f"{self.done:,} of {self.total:,} {self.noun}",
-            f"{self.rate:.3g} a second on {workers} worker{'s'[: workers != 1]}",
-        ]
-        words.append(f"{_duration(left)} left")
-        if self.errors:
-            words.append(f"{self.errors:,} errors")
-        return ", ".join(words)
-
-    def note(self, text: str) -> None:
-        """Prints something else in lines of its own."""
-        print("\r" + text.ljust(self._width) if self._width else text, file=sys.stderr, flush=True)
-        self._width = 0
-
-    def end(self) -> None:
-        """Leaves the line as it is."""
-        if self._width:
-            print(file=sys.stderr, flush=True)
-            self._width = 0
-
-    def _say(self, line: str) -> None:
-        if self._is_terminal:
-            print("\r" + line.ljust(self._width), end="", file=sys.stderr, flush=True)
-            self._width = len(line)
-        else:
-            print(line, file=sys.stderr, flush=True)
+        if monotonic() - self._said < SAY_EVERY and self.done < self.total:
+            return
+        self._said = monotonic()
+        left = (self.total - self.done) / self.rate / 60.0 if self.done else 0.0
+        speed = f"{self.rate:.3g} a second on {_many(workers, 'worker')}, {left:.1f} min left"
+        note(f"{self.done:,} of {self.total:,} {self.noun}, {speed}, {_many(self.errors, 'error')}")
 
 
-def _duration(seconds: float) -> str:
-    if seconds < 90.0:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
+def note(text: str) -> None:
+    """Prints a line for whoever waits."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def summary(rows: list[dict[str, Any]], run: Any) -> str:
+    """A few lines: how much there is, how fast it came, and what could not be touched."""
+    totals = {name: sum(row[name] for row in rows) for name in COUNTS}
+    words = ", ".join(f"{count:,} {name.replace('_', ' ')}" for name, count in totals.items())
+    lines = [f"{_many(len(rows), 'object')}, {sum(totals.values()):,} touches: {words}"]
+    if run.progress.done:
+        lines.append(f"{run.progress.done:,} {run.progress.noun} now, {run.progress.rate:.3g} a second")
+    wrong = [row for row in rows if row["error"]]
+    for row in wrong[:MOST_NAMED]:
+        lines.append(f"{row['object']} ({row['file']}): {_many(row['error'], 'error')}: {row['message']}")
+    if len(wrong) > MOST_NAMED:
+        lines.append(f"and {len(wrong) - MOST_NAMED:,} more objects with errors, see {run.data_set.objects}")
+    return "\n".join([*lines, f"Data set: {run.data_set.folder}"])
+
+
+def _many(count: int, noun: str) -> str:
+    return f"{count:,} {noun}{'s'[: count != 1]}"

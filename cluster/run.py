@@ -15,7 +15,7 @@ from .data_set.options import Options
 from .data_set.whole_options import WholeOptions
 from .engine import Engine, Order, Outcome
 from .input_files import printable
-from .progress import Progress
+from .progress import Progress, note
 from .worker.process import FAILED, STOP
 
 TRIES = 2  # Blocks that are damaged once they are written are made again this often.
@@ -70,11 +70,10 @@ class Run:
             facts, block = orders[outcome.order.label]
             numbers, errors = self.options.numbers(block), 0
             if outcome.how == FAILED:
-                self.progress.note(f"{outcome.order.label}: {outcome.value}")
+                note(f"{outcome.order.label}: {outcome.value}")
                 self.data_set.write_errors(facts, block, numbers, outcome.value)
                 errors = len(numbers)
             self.progress.add(len(numbers), errors, engine.threads)
-        self.progress.end()
 
     def _survey(self, engine: Engine, done: set[str]) -> list[dict[str, Any]]:
         """The facts of all objects that are to be touched, each once, which also go into the manifest."""
@@ -85,7 +84,7 @@ class Run:
             for path in self.files
             if path not in known | self._misnamed
         )
-        self.progress.note(f"{len(self.files) - len(known):,} files to look through")
+        note(f"{len(self.files) - len(known):,} files to look through")
         facts: dict[str, list[dict[str, Any]]] = {path: [] for path in self.files}
         facts |= {path: [_broken(path, MISNAMED)] for path in self._misnamed - known}
         for outcome in self._outcomes(engine, orders):
@@ -134,7 +133,7 @@ class Run:
         with self.data_set.log.open("a", encoding="utf-8") as file:
             file.write(f"{now} {text}\n")
         if aloud:
-            self.progress.note(text)
+            note(text)
 
 
 def summed_up(data_set: DataSet) -> list[dict[str, Any]]:

@@ -4,7 +4,7 @@
 
 The numpy and scipy of PyPI each have their own OpenBLAS with its own threads. If they are called by turns,
 these wait for each other's processors, and a touch takes twice as long, or ten times on a busy machine
-(benchmarks.threads). So everything here runs on one thread.
+(benchmarks.threads, e20b52a). So everything here runs on one thread.
 """
 
 from collections.abc import Callable

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, settings
 from tools import blender
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data" / "meshes"
-DATA = Path(os.environ.get("TACTILE_SCANS", SHARED))  # docs/scans.md says where they are from.
+DATA = Path(os.environ.get("TACTILE_SCANS", SHARED))  # benchmarks/SCANS.md says where they are from.
 
 # The quick and short ones draw the same examples every time, so that no test fails by chance.
 COMMON = {"deadline": None, "suppress_health_check": list(HealthCheck)}
@@ -80,5 +80,5 @@ def files(empty, ball, tmp_path):
 def scans():
     """The folder of real scans."""
     if not DATA.is_dir():
-        pytest.skip("the scans are not here: docs/scans.md")
+        pytest.skip("the scans are not here: benchmarks/SCANS.md")
     return DATA

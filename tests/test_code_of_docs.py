@@ -10,7 +10,6 @@ import re
 import shlex
 import shutil
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -106,8 +105,6 @@ def assert_printed(shown, out):
 def test_samples_run(page, empty, command, folder):
     scope, out = {}, None
     for kind, code in PAGES[page]:
-        if "trimesh" in code and not find_spec("trimesh"):  # It is a peer of the charts only.
-            continue
         if kind == "python":
             # Commands for the shell before it leave the scene in the unit of their file.
             empty.context.scene.unit_settings.system = "METRIC"
@@ -120,7 +117,7 @@ def test_samples_run(page, empty, command, folder):
 
 
 def test_the_sample_of_the_format_is_read(extension, tmp_path):
-    text = (ROOT / "docs" / "contact_data.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "contacts.md").read_text(encoding="utf-8")
     (sample,) = re.findall(r"^```\n(# Tactile Patch contacts.*?)^```", text, re.DOTALL | re.MULTILINE)
     (tmp_path / "sample.csv").write_text(sample)
     found = extension.tactile_addon.files.measured.read([str(tmp_path / "sample.csv")], "FILE", 1.0)

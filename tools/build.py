@@ -28,10 +28,9 @@ PROJECT = ROOT / "pyproject.toml"
 # Blender's own list of patterns can only exclude files. So what ships is named here, and nothing else that
 # lies in a checkout, such as an environment or a scan, can get into a release.
 SHIPPED = ("__init__.py", "LICENSE", "core", "tactile_addon")
-# These pages ship as HTML, with their pictures: the first is what Blender's Online Manual opens, the others
-# are those that it leads to.
+# These pages ship as HTML, with their pictures: they are what Blender's Online Manual opens.
 DOCS = ROOT / "docs"
-MANUAL = ("viewport", "lesson", "messages")
+MANUAL = ("viewport", "patch", "lesson", "maps", "scan", "messages")
 PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Tactile Patch</title>
 <meta name="viewport" content="width=device-width">
 <style>body {{ max-width: 50em; margin: 2em auto; padding: 0 1em; font: 1rem/1.5 sans-serif; }}
@@ -42,7 +41,7 @@ pre {{ background: #eee; padding: 1em; overflow: auto; }}</style>
 </html>
 """
 LEAD = """<!doctype html><meta charset="utf-8"><title>Tactile Patch</title>
-<meta http-equiv="refresh" content="0; url=viewport.html#{}">
+<meta http-equiv="refresh" content="0; url={}.html#{}">
 """
 # For each Python of the wheels, the first Blender that has it and, if there is one, the first that no longer
 # has it.
@@ -206,8 +205,8 @@ def write_manual(folder: Path) -> None:
         for picture in re.findall(r"!\[.*?\]\((.+?)\)", text):
             shutil.copy2(DOCS / picture, folder)
         # Windows opens files without the part after "#", so each section has a page that leads to it.
-        for section in re.findall(r'<h[23] id="(.+?)"', body) if name == MANUAL[0] else []:
-            (folder / f"{section}.html").write_text(LEAD.format(section), encoding="utf-8")
+        for section in set(re.findall(r'<h[23] id="(.+?)"', body)) - set(MANUAL):
+            (folder / f"{section}.html").write_text(LEAD.format(name, section), encoding="utf-8")
 
 
 def shipped_links(text: str) -> str:

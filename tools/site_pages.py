@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # Pages outside of docs that the site has too. Their links start in another folder there.
 OUTSIDE = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
 FENCE = re.compile(r"^```.*?^```", re.DOTALL | re.MULTILINE)
+MARK = re.compile(r"<!-- (?:(?:table|figure) .*?|end) -->")  # Those of tools.figures.
 CODE = re.compile(r"`[^`]*`")
 DISPLAY = re.compile(r"^\$\$(.+?)\$\$$", re.DOTALL | re.MULTILINE)
 INLINE = re.compile(r"\$(\S(?:[^$\n]*\S)?)\$")
@@ -40,7 +41,7 @@ def on_files(files, config):
 
 def on_page_markdown(markdown, **_):
     """Turns formulas between dollar signs into MathML, which browsers show without a script."""
-    kept = []
+    markdown, kept = MARK.sub("", markdown), []
 
     def keep(match):
         kept.append(match[0])

@@ -17,12 +17,7 @@ TOUCHES = (
     ("hash", REPEATED, "", "hash of its geometry, which links rows to objects"),
     ("block", pa.int32(), "", "number of the task that made the row"),
     ("touch", pa.int64(), "", "number of the touch on its object, from 0"),
-    (
-        "seed",
-        pa.int64(),
-        "",
-        "seed of the whole data set; with hash and block it determines places and noise",
-    ),
+    ("seed", pa.int64(), "", "seed of the data set, which with hash and block determines places and noise"),
     ("status", REPEATED, "", "ok, uncertain or not_converged; refused: no patch there; error: no touch"),
     ("message", REPEATED, "", "the status in a sentence"),
     ("location", NUMBERS, LENGTH, "x, y, z of the reference point; all points are in the file's coordinates"),
@@ -39,7 +34,7 @@ TOUCHES = (
         "coefficients",
         NUMBERS,
         "1 / unit^(degree - 1)",
-        "coefficients of x^3, x^2 y, x y^2, y^3, x^4, ... of the patch",
+        "those of x^3, x^2 y, x y^2, y^3, x^4, ... of the patch",
     ),
     ("domain", NUMBERS, LENGTH, "x, y in the frame of the curves' ends, through which the rim runs"),
     ("contacts", NUMBERS, LENGTH, "x, y, z of each contact, curve after curve"),
@@ -51,12 +46,7 @@ TOUCHES = (
     ("extent", NUMBER, LENGTH, "length of the longest half curve"),
     ("step", NUMBER, LENGTH, "distance between contacts"),
     ("noise", NUMBER, LENGTH, "standard deviation of the simulated sensor"),
-    (
-        "mesh_error",
-        NUMBER,
-        LENGTH,
-        "mean distance in height between mesh and patch; null where there is none",
-    ),
+    ("mesh_error", NUMBER, LENGTH, "mean distance in height of mesh and patch; null where there is none"),
 )
 OBJECTS = (
     ("object", WORD, "", "name of the mesh object in a .blend or .obj, or else of the file"),
@@ -77,18 +67,8 @@ FOUND = (
     ("uncovered", pa.int64(), "", "number of places on rims beyond which the object goes on unfelt"),
     ("is_closed", pa.bool_(), "", "whether the surface is closed all round, with no rim left"),
     ("height_std", NUMBER, LENGTH, "standard deviation of the surface, mean over its vertices"),
-    (
-        "deviation_mean",
-        NUMBER,
-        LENGTH,
-        "mean distance of the surface from the mesh and of the mesh from the surface",
-    ),
-    (
-        "deviation_max",
-        NUMBER,
-        LENGTH,
-        "largest distance of the surface from the mesh or of the mesh from the surface",
-    ),
+    ("deviation_mean", NUMBER, LENGTH, "mean distance of surface and mesh, both ways"),
+    ("deviation_max", NUMBER, LENGTH, "largest distance of surface and mesh, either way"),
 )
 SURFACES = (
     *TOUCHES[:2],
@@ -111,12 +91,7 @@ SURFACES = (
     ("k2", NUMBERS, PER_LENGTH, "larger principal curvature of each node"),
     ("k1_stds", NUMBERS, PER_LENGTH, "standard deviation of k1 of each node"),
     ("k2_stds", NUMBERS, PER_LENGTH, "standard deviation of k2 of each node"),
-    (
-        "height_stds",
-        NUMBERS,
-        LENGTH,
-        "standard deviation of the height of each node's patch, mean over its domain",
-    ),
+    ("height_stds", NUMBERS, LENGTH, "mean standard deviation of the height of each node's patch"),
     ("edges", INTEGERS, "", "edges of the graph: two nodes each, whose patches share a boundary"),
 )
 

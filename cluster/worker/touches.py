@@ -30,10 +30,10 @@ def touched(target: Touchable, options: Options, block: int) -> tuple[list[dict[
     return rows, process_time() - start
 
 
-def explored(target: Touchable, options: Options, block: int) -> Iterator[tuple[Any, Any, list[Any]]]:
-    """Yields places, outward normals and what was found there, batch by batch."""
+def _rows(target: Touchable, options: Options, block: int) -> Iterator[dict[str, Any]]:
     rng = np.random.default_rng([options.seed, int(target.facts["hash"], 16), block])
     size, count = target.facts["size"], len(options.numbers(block))
+    noise = options.length("noise", size)
     points, outward = target.places(count, rng)
     for start in range(0, count, BATCH):
         batch = slice(start, start + BATCH)
@@ -46,18 +46,12 @@ def explored(target: Touchable, options: Options, block: int) -> Iterator[tuple[
             rng=rng,
             **options.exploration(size),
         )
-        yield points[batch], outward[batch], found
-
-
-def _rows(target: Touchable, options: Options, block: int) -> Iterator[dict[str, Any]]:
-    noise = options.length("noise", target.facts["size"])
-    for batch in explored(target, options, block):
-        for point, outward, found in zip(*batch, strict=True):
-            row = {"location": point + target.offset, "outward": outward, "noise": noise}
-            if isinstance(found, ValueError):
-                yield row | {"status": "refused", "message": str(found)}
+        for point, up, each in zip(points[batch], outward[batch], found, strict=True):
+            row = {"location": point + target.offset, "outward": up, "noise": noise}
+            if isinstance(each, ValueError):
+                yield row | {"status": "refused", "message": str(each)}
             else:
-                yield row | _row(target, found)
+                yield row | _row(target, each)
 
 
 def _row(target: Touchable, found: Any) -> dict[str, Any]:

@@ -22,7 +22,7 @@ WAVINESS_SPREAD = 0.5  # The waviness has a log-normal prior with the median USU
 NOISES = 5  # The number of points in the grid of the noise, from the floor up.
 ROUNDING = 1e-13  # Rounding takes at most this share of a system's trace.
 UNLIKELY = 1400.0  # The exponential of half this difference of -2 log likelihood is still a number.
-GROUP = 4  # The number of touches whose likelihoods are computed at once (benchmarks.speed).
+GROUP = 4  # The number of touches whose likelihoods are computed at once (benchmarks.speed, e20b52a).
 # Chosen with benchmarks.real.
 AMPLITUDES = np.array([0.003, 0.01, 0.04, 0.14, 0.5])  # Grid of the process's deviation, in unit radius.
 SEXTIC_WAVINESS = np.array([0.3, 0.6, 1.2])  # The waviness of the polynomials that a process competes with.

@@ -22,7 +22,7 @@ from .prior import FREE, USUAL_WAVINESS, prior_mean, prior_variances
 from .sextic import Sextics, mean_given, posterior_given, sextics, with_scatter
 
 # The noise is at least this share of the radius, because no surface is a polynomial. With less the waviness
-# follows what polynomials leave, and automatic touches end earlier (benchmarks.model).
+# follows what polynomials leave, and automatic touches end earlier (benchmarks.model, e20b52a).
 MISFIT = 2e-3
 # benchmarks.accuracy judges these, and the outliers of benchmarks.stability the last two.
 # The largest number of passes: two turn the frame to what they found, others are for outliers.

@@ -16,7 +16,7 @@ from .joint_fit import MISFIT
 from .prior import USUAL_WAVINESS, prior_variances
 from .sextic import mean_given, sextics
 
-# benchmarks.extents judges these.
+# benchmarks.extents of e20b52a judged these.
 EXPLAINED_TERMS = 15  # Three curves show this many of the 27 terms, which take as many degrees of freedom.
 NOISY = 1.5  # Contacts may be off by this multiple of their noise for no other reason.
 

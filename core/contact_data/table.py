@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contacts from the text of a CSV file, and back. docs/contact_data.md describes the format."""
+"""Contacts from the text of a CSV file, and back. docs/contacts.md describes the format."""
 
 import csv
 import io

@@ -9,7 +9,7 @@ from typing import Protocol
 from ..arguments import LARGEST, shown
 from .contour import CREASE, NO_CONTACT, NOT_MONGE, Vector, cross, dot, scaled
 
-# benchmarks.refusals counts what these refuse.
+# benchmarks.refusals of e20b52a counted what these refuse.
 MAX_TURN = math.cos(math.radians(45.0))  # A sharper turn between two contacts is a crease to a finger.
 # A normal tilted more against that at the point has slopes above 3.7.
 MAX_TILT = math.cos(math.radians(75.0))

@@ -37,7 +37,7 @@ ROUGH = 0.03  # Then those up to this roughness are fitted: with SMOOTH, five of
 TAPS_OFF = 0.015  # over 2 %, with 0.01 there is a seventh less area.
 # There is no surface at this share of its area at most: with 0.04 a patch spans the hole of a washer.
 LARGE_GAP = 0.02
-HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed --base).
+HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed, e20b52a).
 
 Answer = Reconstruction | DegenerateCurvesError
 

@@ -14,7 +14,7 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import CONTRADICTING, DOUBTFUL_GAP, useless
 from ..verdict import OK, Doubt, beyond
 
-# benchmarks.refusals counts the patches that are off, but ok.
+# benchmarks.refusals of e20b52a counted the patches that are off, but ok.
 MESH_LAYERS = 8  # A sample is compared with no more layers of the mesh above and below it,
 HAIR = 1e-4  # and rays go on this share of their reach beyond each.
 # Rays begin at this share of the radius above a patch: one tells where the surface is near, as it mostly is.

@@ -9,7 +9,7 @@ from ..bayes.process_fit import MOST_PLACES
 from ..lapack import cholesky, solved
 from ..reconstruction.result import Reconstruction
 
-# benchmarks.amount chose these.
+# benchmarks.amount of e20b52a chose these.
 CONTACTS = 12  # A half curve of a given extent has this many contacts,
 DENSER = (1, 2, 4)  # and any the first of these multiples that suffices.
 # More contacts help if twice as many would lower the mean deviation of the height by the share NOTICEABLE.

@@ -12,8 +12,8 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import CONTRADICTING, Taps
 from .mesh_error import heights_at, mean_error, side_of
 
-# benchmarks.real --only taps chooses these. Between the ends of two curves there are four taps at NEAR_RIM of
-# the way to the boundary, and two at WITHIN.
+# benchmarks.real --only taps of e20b52a chose these. Between the ends of two curves there are four taps at
+# NEAR_RIM of the way to the boundary, and two at WITHIN.
 NEAR_RIM, WITHIN = 0.98, 0.6
 TOO_FAR_OFF = 10.0  # A tap that is off by more deviations contradicts the fit by itself.
 

@@ -16,7 +16,7 @@ from ..patch.monge import PARTIALS
 from .least_squares import Problem, on_grid
 
 # |D| is rounded by these shares of its mean at the start, one after the other. With the last one the minimum
-# is right to a millionth: benchmarks.speed compares it and its time with those of L-BFGS-B.
+# is right to a millionth: benchmarks.speed of e20b52a compared it with L-BFGS-B.
 ROUNDINGS = np.geomspace(1.0, 1e-5, 14)
 SETTLED_OBJECTIVE = 1e-3  # When a step wins less than this share of the objective, the next rounding begins.
 CONVERGED = 1e-8

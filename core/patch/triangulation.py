@@ -19,7 +19,7 @@ from ..arguments import Array
 from .domain import Domain
 from .monge import HeightField
 
-# benchmarks.patch_mesh judges all of these.
+# benchmarks.patch_mesh of e20b52a judged all of these.
 CHORD = 4.6  # side^2 = CHORD tolerance / curvature; for equilateral triangles it would be 8.
 # Bounds of the distance of neighbors, in mean radii: they carry colors.
 COARSEST_EDGE, FINEST_EDGE = 0.25, 0.02

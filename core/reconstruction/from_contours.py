@@ -25,7 +25,7 @@ from .stacks import fitted_stack
 from .start import Given
 from .strokes import gathered
 
-STACK = 4000  # The number of contacts that fit into a processor's cache at once (benchmarks.speed).
+STACK = 4000  # The number of contacts that fit into a processor's cache at once (benchmarks.speed, e20b52a).
 
 
 def reconstruct(

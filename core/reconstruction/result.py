@@ -37,7 +37,7 @@ from . import status
 from .status import Taps
 
 NEAR_POINT = 0.6  # This share of a process's deviation is left at the point (benchmarks.real).
-# The mesh is off the patch by at most this share of mean_height_std (benchmarks.patch_mesh).
+# The mesh is off the patch by at most this share of mean_height_std (benchmarks.patch_mesh, e20b52a).
 MESH_SHARE = 0.6
 
 

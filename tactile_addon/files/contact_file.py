@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contact data in files: CSV in and out, PLY in, JSON out. docs/contact_data.md describes the formats."""
+"""Contact data in files: CSV in and out, PLY in, JSON out. docs/contacts.md describes the formats."""
 
 import json
 from dataclasses import replace

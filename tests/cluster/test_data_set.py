@@ -60,16 +60,15 @@ def test_noise_is_a_share_of_the_object_where_it_is_said_so(command, objects, tm
         assert row["extent"] == pytest.approx(0.1 * size)
 
 
-def test_units_and_meanings_are_in_the_file_and_in_the_manual(plain):
-    from pathlib import Path
-
+def test_units_and_meanings_are_in_the_files(plain):
     from cluster.data_set import columns
 
-    schema = pq.read_schema(blocks_of(plain)[0])
-    assert schema.field("k1").metadata[b"unit"] == b"1 / object's unit"
-    page = (Path(__file__).parents[2] / "docs" / "data_sets.md").read_text(encoding="utf-8")
-    for name, _, unit, meaning in (*columns.TOUCHES, *columns.OBJECTS, *columns.SURFACES):
-        assert f"| `{name}` | {unit} | {meaning} |" in page, name
+    files = ((blocks_of(plain)[0], columns.TOUCHES), (plain / "objects.parquet", columns.OBJECTS))
+    for path, wanted in files:
+        schema = pq.read_schema(path)
+        for name, _, unit, meaning in wanted:
+            found = schema.field(name).metadata
+            assert (found[b"unit"].decode(), found[b"description"].decode()) == (unit, meaning), name
 
 
 def test_rows_are_the_same_with_one_worker_as_with_two(plain, objects, tmp_path):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The samples of docs/data_sets.md that read a data set run, wherever the packages they import are there."""
+"""The samples of docs/scripting.md that read a data set run, wherever the packages they import are there."""
 
 import re
 from importlib.util import find_spec
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-PAGE = Path(__file__).parents[2] / "docs" / "data_sets.md"
+PAGE = Path(__file__).parents[2] / "docs" / "scripting.md"
 SAMPLES = [
     code
     for code in re.findall(r"^```py\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run in a window of Blender with the extension installed: docs/worked_example.md as it is written.
+"""Run in a window of Blender with the extension installed: docs/scan.md as it is written.
 
 Contacts are simulated, their pose is forgotten, and they are read, registered and verified by the buttons'
 operators. The pictures for docs are lost.jpg and found.jpg.
@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from common import FOLDER, check, look, open_tab, picture_of_docs, until
 
 ROOT = Path(__file__).resolve().parents[2]
-DOCS, PEBBLE = ROOT / "docs" / "worked_example.md", ROOT / "examples" / "pebble.ply"
+DOCS, PEBBLE = ROOT / "docs" / "scan.md", ROOT / "examples" / "pebble.ply"
 
 
 def lose():

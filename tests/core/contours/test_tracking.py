@@ -43,6 +43,35 @@ def test_contacts_are_on_the_surface_in_the_plane_and_a_step_apart(surface):
         assert np.abs(contour.normals - exact).max() < 1e-9
 
 
+class Roof:
+    """The plane z = 0, which turns down by an angle beyond x = 1."""
+
+    def __init__(self, degrees):
+        turn = np.radians(degrees)
+        self.walls = (
+            (np.array([0.0, 0.0, 1.0]), 0.0),
+            (np.array([np.sin(turn), 0.0, np.cos(turn)]), np.sin(turn)),
+        )
+
+    def ray_cast(self, origin, direction, distance):
+        hits = []
+        for wall, (normal, offset) in enumerate(self.walls):
+            across = normal @ direction
+            gone = (offset - normal @ origin) / across if across else -1.0
+            point = np.add(origin, np.multiply(gone, direction))
+            if 0.0 <= gone <= distance and (point[0] > 1.0) == bool(wall):
+                hits.append((gone, point, normal))
+        return min(hits, key=lambda hit: hit[0])[1:] if hits else None
+
+
+@pytest.mark.parametrize(("degrees", "stop"), [(44.0, "extent"), (46.0, "crease")])
+def test_a_turn_of_more_than_45_degrees_is_a_crease(degrees, stop):
+    (contour,) = track(
+        Roof(degrees), np.zeros(3), (0.0, 0.0, 1.0), [SamplingPlane(0.0)], extent=2.0, step=0.15
+    )
+    assert contour.stops == ("extent", stop)
+
+
 def test_a_tilted_plane_cuts_a_smaller_circle_of_a_sphere():
     """A plane tilted by b through a point of a sphere of radius r is r sin b from its center."""
     ball, tilt = surfaces.sphere(20.0), np.radians(30)

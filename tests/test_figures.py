@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a small run of benchmarks.accuracy finds is what the README and the first table of the pages have."""
+
+import numpy as np
+import pytest
+
+from benchmarks import accuracy
+from tools import figures
+
+SHAPES = 16
+ALIKE = {accuracy.CUBIC: "mean / cubic's", accuracy.PROCESS: "mean / process's"}
+
+
+def cell(head, row, column):
+    """A cell of a table that the benchmark has printed."""
+    rows = figures.printed("accuracy", head)
+    (found,) = (each for each in rows[2:] if each[0] == row)
+    return found[rows[0].index(column)]
+
+
+@pytest.mark.parametrize("method", [accuracy.BAYES, accuracy.CUBIC])
+@pytest.mark.parametrize("planes", accuracy.EXACT_PLANES)
+def test_without_noise_the_errors_on_exact_surfaces_are_those_of_the_table(method, planes):
+    cases = [accuracy.exact_case(name, planes, 0.0, i) for i, name in enumerate(accuracy.SURFACES)]
+    found = np.median([accuracy.score(accuracy.METHODS[method](case), case).error for case in cases])
+    assert found == pytest.approx(float(cell("method | 0/60/120, 0", method, f"{planes}, 0")), abs=0.6)
+
+
+@pytest.mark.long
+def test_the_errors_on_random_shapes_are_those_of_the_readme_within_their_noise():
+    scores = [accuracy.random_scores(seed) for seed in range(SHAPES)]
+
+    def means(method, measure):
+        """The mean (SHAPES,) over the sets of planes, by shape."""
+        return np.array([np.mean([getattr(s[method], measure) for s in of.values()]) for of in scores])
+
+    ours = means(accuracy.BAYES, "error")
+    for method in (m for m in accuracy.SHAPE_METHODS if m in ALIKE):
+        theirs = means(method, "error")
+        ratio = ours.mean() / theirs.mean()
+        noise = np.std(ours - ratio * theirs) / theirs.mean() / np.sqrt(SHAPES)
+        assert float(cell("planes | median", "all", ALIKE[method])) == pytest.approx(ratio, abs=3.0 * noise)
+    covered = 100.0 * means(accuracy.BAYES, "covered")
+    told = float(cell("planes | median", "all", "covered").split()[0])
+    assert told == pytest.approx(covered.mean(), abs=3.0 * covered.std() / np.sqrt(SHAPES))
