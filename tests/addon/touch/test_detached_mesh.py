@@ -101,7 +101,8 @@ def test_a_touch_within_one_bent_facet_is_in_doubt_on_a_map_too(empty, extension
     mesh = extension.tactile_addon.touch.detached_mesh.DetachedMesh(obj, depsgraph)
     found = extension.tactile_addon.scene.patch_record.reconstruction_of(patch)
     on_mesh = extension.core.with_facets(found, mesh.face_near, mesh.corners_of)
-    assert on_mesh.shape_curvatures == pytest.approx(found.shape_curvatures, rel=0.2)
+    assert on_mesh.status == "uncertain"
+    assert on_mesh.k1_std > max(abs(found.k1), abs(found.k2))
 
 
 @pytest.mark.parametrize("scale", [(1.0, 0.7, 0.04), (-1.0, 0.7, 0.04), (2.0, 2.0, 2.0), (-1.0, -1.0, -1.0)])
