@@ -230,21 +230,18 @@ class TACTILE_PT_probes(_Sidebar, bpy.types.Panel):
     def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
         """Draws a row for each probe, to click: its verdict as an icon, its name and its curvatures."""
         column = layout.column(align=True)
-        for found in sorted(filter(probe.is_probe, context.view_layer.objects), key=lambda each: each.name):
-            record = probe.record_of(found)
-            icon, words = "ERROR", found.tactile_probe.message
+        probes: list[Object] = [each for each in context.view_layer.objects if probe.is_probe(each)]
+        for found in sorted(probes, key=lambda each: each.name):
+            record, words = probe.record_of(found), found.tactile_probe.message
+            icon: Any = "ERROR" if record is None else ICONS.get(record["status"], "ERROR")
             if record is not None:
-                icon = ICONS.get(record["status"], "ERROR")
                 rows = main_rows(record, units.unit_of_report(context.scene, record))
                 words = "   ".join(f"{label} {value}" for label, value in rows)
-            row = column.operator(
-                TACTILE_OT_activate.bl_idname,
-                text=f"{found.name}   {words}",
-                icon=icon,
-                depress=found == probe.probe_of(obj),
-                translate=False,
+            text, is_active = f"{found.name}   {words}", found == probe.probe_of(obj)
+            go = column.operator(
+                TACTILE_OT_activate.bl_idname, text=text, icon=icon, depress=is_active, translate=False
             )
-            row.name = found.name
+            go.name = found.name
         row = layout.row(align=True)
         row.operator(TACTILE_OT_export_table.bl_idname, text="Table", icon="EXPORT")
         row.operator(TACTILE_OT_export_report.bl_idname, text="Report", icon="FILE_TEXT")
