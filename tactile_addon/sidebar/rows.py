@@ -121,7 +121,7 @@ def draw_rows(
 def draw_sentence(
     context: bpy.types.Context, layout: bpy.types.UILayout, sentence: str, icon: Any, lines: int | None = None
 ) -> None:
-    """Draws a sentence in as many lines as the sidebar's width needs, or in just so many, if that is given."""
+    """Draws a sentence in as many lines as the sidebar's width needs, or in just as many as given."""
     column = layout.column(align=True)
     column.scale_y = 0.8
     width = max(16, int(_letters(context)))
