@@ -131,9 +131,7 @@ def _add_join(add: Callable[..., Any]) -> None:
 
 
 def _add_map(add: Callable[..., Any]) -> None:
-    add(
-        "--spacing", type=float, help="distance between the points that are touched (a quarter of the extent)"
-    )
+    add("--spacing", type=float, help="distance between the points that are touched (half of the extent)")
     _add_inputs(add)
 
 

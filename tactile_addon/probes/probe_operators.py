@@ -238,7 +238,7 @@ class TACTILE_OT_activate(bpy.types.Operator):
     name: StringProperty(name="Name", description="Name of the probe", options={"SKIP_SAVE"})
 
     def execute(self, context: bpy.types.Context) -> Outcome:
-        found = context.view_layer.objects.get(self.name)
+        found: Object | None = context.view_layer.objects.get(self.name)
         if found is None:
             return report_error(self, ValueError(f'There is no probe "{self.name}" in this view layer'))
         make_active(context, found)

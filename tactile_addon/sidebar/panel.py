@@ -36,7 +36,7 @@ from ..touch.settings import draw_chosen, draw_fit, draw_noise
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object, PanelMixin
 from ..touch.units import Unit
-from ..touch.wording import reasons, registration_summary, verdict
+from ..touch.wording import curvatures, reasons, registration_summary, verdict
 from ..viewport.pick import TACTILE_OT_pick
 from ..whole_object.object_operator import TACTILE_OT_touch_all_over
 from ..whole_object.object_report import deviation, facets, is_all_within, object_rows, object_verdict
@@ -53,6 +53,7 @@ TAB = "Tactile"
 FACETED = {"facets", "folds"}  # A Subdivision modifier may take these doubts away.
 HELP = "Click on a mesh: a probe feels its surface there and keeps a patch of it with its curvatures"
 OTHER_MODE = "Objects are touched in Object Mode, so the buttons are gray"
+NARROW = 200  # A sidebar of fewer pixels at scale 1 is narrow.
 VERDICT_LINES = 2  # The verdict has this room, so that nothing below it jumps while a probe is dragged.
 ICONS = {"ok": "CHECKMARK"}
 
@@ -91,7 +92,7 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         layout.prop(settings, "target")
         chosen = found_values(record, context.scene)
         draw_chosen(layout, settings, "extent", chosen)
-        _draw_planes(layout, settings)
+        _draw_planes(context, layout, settings)
         row = layout.row()
         row.prop(settings, "live", text="Live" if settings.live else "Live (Frozen)")
         row.operator(TACTILE_OT_update.bl_idname, text="", icon="FILE_REFRESH")
@@ -117,11 +118,13 @@ def _draw_pick(context: bpy.types.Context, layout: bpy.types.UILayout, obj: Obje
         draw_sentence(context, layout, HELP, "INFO")
 
 
-def _draw_planes(layout: bpy.types.UILayout, settings: Any) -> None:
+def _draw_planes(context: bpy.types.Context, layout: bpy.types.UILayout, settings: Any) -> None:
+    """Draws the angles of the planes; a narrow sidebar has room for one of the two."""
+    is_wide = context.region.width > NARROW * context.preferences.system.ui_scale
     column = layout.column(align=True)
     heading = column.row(align=True)
     heading.label(text="", icon="BLANK1")
-    for text in ("Azimuth", "Tilt"):
+    for text in ("Azimuth", "Tilt") if is_wide else ("Azimuth",):
         heading.label(text=text)
     heading.operator(TACTILE_OT_add_plane.bl_idname, text="", icon="ADD")
     for i in range(settings.plane_count):
@@ -129,7 +132,8 @@ def _draw_planes(layout: bpy.types.UILayout, settings: Any) -> None:
         row.use_property_split = False
         row.label(text="", icon_value=dot(i))
         row.prop(settings, "azimuths", index=i, text="")
-        row.prop(settings, "tilts", index=i, text="")
+        if is_wide:
+            row.prop(settings, "tilts", index=i, text="")
         row.operator(TACTILE_OT_remove_plane.bl_idname, text="", icon="REMOVE").plane = i
 
 
@@ -239,21 +243,17 @@ class TACTILE_PT_probes(_Sidebar, bpy.types.Panel):
     def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
         """Draws a row for each probe, to click: its verdict as an icon, its name and its curvatures."""
         column = layout.column(align=True)
-        for found in sorted(filter(probe.is_probe, context.view_layer.objects), key=lambda each: each.name):
-            record = probe.record_of(found)
-            icon, words = "ERROR", found.tactile_probe.message
+        probes: list[Object] = [each for each in context.view_layer.objects if probe.is_probe(each)]
+        for found in sorted(probes, key=lambda each: each.name):
+            record, words = probe.record_of(found), found.tactile_probe.message
+            icon: Any = "ERROR" if record is None else ICONS.get(record["status"], "ERROR")
             if record is not None:
-                icon = ICONS.get(record["status"], "ERROR")
-                rows = main_rows(record, units.unit_of_report(context.scene, record))
-                words = "   ".join(f"{label} {value}" for label, value in rows)
-            row = column.operator(
-                TACTILE_OT_activate.bl_idname,
-                text=f"{found.name}   {words}",
-                icon=icon,
-                depress=found == probe.probe_of(obj),
-                translate=False,
+                words = curvatures(record, units.unit_of_report(context.scene, record))
+            text, is_active = f"{found.name}   {words}", found == probe.probe_of(obj)
+            go = column.operator(
+                TACTILE_OT_activate.bl_idname, text=text, icon=icon, depress=is_active, translate=False
             )
-            row.name = found.name
+            go.name = found.name
         row = layout.row(align=True)
         row.operator(TACTILE_OT_export_table.bl_idname, text="Table", icon="EXPORT")
         row.operator(TACTILE_OT_export_report.bl_idname, text="Report", icon="FILE_TEXT")

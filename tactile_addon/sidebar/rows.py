@@ -117,13 +117,14 @@ def draw_rows(
 
 
 def draw_sentence(
-    context: bpy.types.Context, layout: bpy.types.UILayout, sentence: str, icon: Any, lines: int = 1
+    context: bpy.types.Context, layout: bpy.types.UILayout, sentence: str, icon: Any, lines: int | None = None
 ) -> None:
-    """Draws a sentence in as many lines as the sidebar's width needs, and at least in as many as given."""
+    """Draws a sentence in as many lines as the sidebar's width needs, or in just as many as given."""
     column = layout.column(align=True)
     column.scale_y = 0.8
-    found = textwrap.wrap(sentence, max(16, int(_letters(context))))
-    for i, line in enumerate([*found, *[""] * (lines - len(found))]):
+    width = max(16, int(_letters(context)))
+    found = textwrap.wrap(sentence, width, max_lines=lines, placeholder=" …")
+    for i, line in enumerate([*found, *[""] * ((lines or 0) - len(found))]):
         column.label(text=line, icon=icon if i == 0 else "BLANK1")
 
 

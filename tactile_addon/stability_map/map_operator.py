@@ -39,7 +39,7 @@ class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
 
     spacing: length_property(
         "Spacing",
-        "Distance between the points that are touched; 0 uses a quarter of the extent, or a 32nd of the "
+        "Distance between the points that are touched; 0 uses half of the extent, or a 16th of the "
         "object's size where the extent is automatic",
     )
 

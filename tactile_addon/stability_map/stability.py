@@ -22,7 +22,7 @@ from ..touch.types import Array, Object, Point, Triple
 from ..touch.units import length
 
 EXTENT_SHARE = 1.0 / 8.0  # This share of the object's size stands for an extent that touches choose.
-SPACING_SHARE = 1.0 / 4.0  # The default spacing, as a share of the extent.
+SPACING_SHARE = 1.0 / 2.0  # The default spacing, as a share of the extent.
 TRIED_SPACING = 1.0 / 4.0  # Touches that are timed are so far apart, as a share of the object's size.
 BATCH = 20  # The number of touches that are fitted at once, in some hundredths of a second.
 GROWING_BATCH = 4  # Touches that choose their extent are fewer, because their fits have more contacts.

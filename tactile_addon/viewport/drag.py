@@ -16,7 +16,7 @@ from ..touch.settings import MOST_PLANES, STEEPEST
 from ..touch.surface import MeshSurface
 from ..touch.touch_object import plane_axes
 from ..touch.types import Object, Outcome
-from .mouse import draw_hints, mouse_ray
+from .mouse import draw_hints, line_of_sight, mouse_ray
 
 DRAG_TURN, DRAG_TILT, DRAG_EXTENT, POINT = "TURN", "TILT", "EXTENT", "POINT"
 # If the sine of the angle between view and plane is less, nothing can be dragged in the plane, or not well.
@@ -150,7 +150,8 @@ class TACTILE_OT_drag(bpy.types.Operator):
             settings = probe.probe_of(context.object).tactile_probe
             t = Vector(plane_axes(self._matrix, settings, self.plane)[:, 0].tolist())
             right, up, normal = normal, normal.cross(t), t
-        if abs(direction.dot(normal)) < EDGE_ON:
+        sight = line_of_sight(context.region_data, center)
+        if min(abs(way.dot(normal)) for way in (direction, sight)) < EDGE_ON:
             return None
         at = intersect_line_plane(origin, origin + direction, center, normal)
         if at is None or (at - center).length == 0.0:

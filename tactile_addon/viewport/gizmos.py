@@ -16,11 +16,12 @@ from ..touch.touch_object import plane_axes
 from .curves import PLANE_COLORS
 from .drag import DRAG_EXTENT, DRAG_TILT, DRAG_TURN, POINT, STEEP, shown_probe
 from .free_view import is_free
+from .mouse import line_of_sight
 
 # Handles that turn planes are on the ends of their curves, and those that tilt planes this many extents above
 # the point, or at the first place where the view is free: at the other end, or nearer.
 UPRIGHT, UPRIGHT_PLACES = 0.75, 10
-MARGIN = 10.0  # It is free where this many pixels at scale 1 around a handle are.
+MARGIN = 10.0  # The radius of a handle in pixels at scale 1; handles do not overlap.
 BALL, LEAST_BALL = 0.12, 0.05  # Sizes of balls, in units of Blender's gizmo size.
 SHARE = 0.125  # A ball is no larger than this share of the patch in the view.
 APART = 24.0  # Handles that are nearer to the point in the view than this many pixels at scale 1 are hidden.
@@ -83,7 +84,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         handles = list(zip(self.turns[: settings.plane_count], lines, strict=False))
         t, up = (Vector(axis) for axis in plane_axes(matrix, settings, active).T.tolist()[:2])
         # If the tilt's plane is seen edge on, a little way of the mouse turns it by much.
-        if abs(_line_of_sight(context.region_data, center).dot(t)) >= STEEP:
+        if abs(line_of_sight(context.region_data, center).dot(t)) >= STEEP:
             shares = np.linspace(-UPRIGHT, UPRIGHT, 2 * UPRIGHT_PLACES).tolist()
             handles.append((self.tilts[active], [center + share * reach * up for share in shares]))
         for each in (*self.turns, *self.tilts):
@@ -105,7 +106,9 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
 
         def is_good(end: int) -> bool:
             at = _seen(context, places[end])
-            return is_free(context, at, margin) and all((at - other).length > 2.0 * margin for other in taken)
+            return is_free(context, at, 2.5 * margin) and all(
+                (at - other).length > 2.0 * margin for other in taken
+            )
 
         if not handle.is_modal:  # One that is dragged stays at its end.
             self.ends[handle] = next(filter(is_good, range(len(places))), 0)
@@ -143,11 +146,3 @@ def _right(context: bpy.types.Context) -> Vector:
     """The direction to the right in the view."""
     to_world: Any = context.region_data.view_matrix.inverted_safe()
     return to_world.col[0].xyz.normalized()
-
-
-def _line_of_sight(view: bpy.types.RegionView3D, point: Vector) -> Vector:
-    """The direction from the eye to a point of the world."""
-    to_world: Any = view.view_matrix.inverted_safe()
-    if view.is_perspective:
-        return (point - to_world.translation).normalized()
-    return -to_world.col[2].xyz.normalized()

@@ -55,3 +55,11 @@ def mouse_ray(
         return to_world.translation, (to_world.to_3x3() @ ahead).normalized()
     aside = Vector(((x - window[0][3]) / window[0][0], (y - window[1][3]) / window[1][1], 0.0))
     return to_world @ aside, -to_world.col[2].xyz.normalized()
+
+
+def line_of_sight(view: bpy.types.RegionView3D, point: Vector) -> Vector:
+    """The direction from the eye to a point of the world."""
+    to_world: Any = view.view_matrix.inverted_safe()
+    if view.is_perspective:
+        return (point - to_world.translation).normalized()
+    return -to_world.col[2].xyz.normalized()

@@ -67,7 +67,8 @@ class GrowingPatches:
         points, mean_curvatures = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
         count = 1 + SPOKES * len(RINGS)
         triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
-        shades = colors.diverging(mean_curvatures, bend_range(*np.transpose(self._bends), self._size))
+        bends, areas = np.transpose(self._bends)
+        shades = colors.diverging(mean_curvatures, bend_range(bends, areas, self._size))
         shades.reshape(-1, count, 4)[:, -SPOKES:] = RIM_COLOR
         fill(obj.data, points, triangles, [(COLOR, shades)])
 

@@ -88,7 +88,7 @@ def pick(target):
     check(
         "... with z along the normal, toward the eye", normal.dot(outward) > 0.99 and normal.y < 0.0, normal
     )
-    check("... and nothing else", len(bpy.data.objects) == len(before["objects"]) + 3, data_blocks())
+    check("... and nothing else", len(bpy.data.objects) == len(before["objects"]) + 2, data_blocks())
     consistent("picked")
     picture("picked")
     after = data_blocks()

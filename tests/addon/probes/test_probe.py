@@ -753,7 +753,7 @@ def test_the_colors_show_what_is_chosen_after_an_update_too(empty, ball, shown):
         probe.tactile_probe.extent = extent
         limit, data = report_of(patch)["color_limit"], values(patch, shown, "value", 1)
         report = report_of(patch)
-        bend = report["k1_std"] - report["k1"]
+        bend = -report["k1"] - report["k1_std"]
         wanted = {
             "deviation": 3.0 * report["height_std"],
             "mean_curvature": bend,

@@ -82,7 +82,8 @@ def test_a_touch_that_knows_nothing_does_not_set_the_range(empty, ball):
     limit = sure["tactile"]["color_limit"]
     noisy = touch(empty, (0, 1, 0), extent=0.15, noise=0.02, seed=1)
     assert noisy["tactile"]["status"] == "uncertain"
-    assert {patch["tactile"]["color_limit"] for patch in (sure, noisy)} == {limit}
+    (both,) = {patch["tactile"]["color_limit"] for patch in (sure, noisy)}
+    assert 0.75 * limit <= both <= limit
 
 
 def test_a_tiny_patch_does_not_set_the_range_of_the_others(empty, ball):
