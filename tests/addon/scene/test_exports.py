@@ -14,7 +14,8 @@ AXES = {"forward_axis": "Y", "up_axis": "Z"}
 
 
 def ply(bpy, path):
-    bpy.ops.wm.ply_export(filepath=path, export_selected_objects=True, **AXES)
+    """Without attributes, with which Blender ends where objects with one are before and behind others."""
+    bpy.ops.wm.ply_export(filepath=path, export_selected_objects=True, export_attributes=False, **AXES)
     return lambda: bpy.ops.wm.ply_import(filepath=path, **AXES)
 
 
@@ -62,9 +63,9 @@ def patches(bpy):
 
 
 def contours(bpy):
-    """Their contours; as a .ply with them, whose attributes are others, Blender 4.5 ends itself."""
+    """Patches with their contours, whose attributes are others."""
     for patch in list(patches(bpy)):
-        yield from patch.children
+        yield from (patch, *patch.children)
 
 
 def surface(bpy):
