@@ -74,8 +74,9 @@ def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, f
     area = 0.5 * float(np.linalg.norm(triangle_cross(mesh.points[mesh.triangles]), axis=1).sum())
     places = core.scattered(mesh.points, mesh.triangles, PLACES, np.random.default_rng(SEED))
     begin = perf_counter()
-    options = {"tolerance": tolerance, "noise": noise, "rng": SEED}
-    touches, tried, patches = core.expected_touches(mesh, *places, area, **options)
+    touches, tried, patches = core.expected_touches(
+        mesh, *places, area, tolerance=tolerance, noise=noise, rng=SEED
+    )
     each = (perf_counter() - begin) / tried
     areas = np.array([r.domain.area for r in patches])
     share = float(np.average([mesh.is_of_facets(r) for r in patches], weights=areas))

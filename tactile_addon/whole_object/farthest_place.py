@@ -24,8 +24,8 @@ def why_far(
 
     patch : what was felt nearest to the place, if anything was
     """
-    foot, normal, _ = surface.project(place.tolist())
-    narrow = min(_room(surface, foot, sign * np.array(normal)) for sign in (-1.0, 1.0))
+    foot, normal = (np.array(vector) for vector in surface.project(place.tolist())[:2])
+    narrow = min(_room(surface, foot, sign * normal) for sign in (-1.0, 1.0))
     words = length(off, unit), length(narrow, unit)
     if surface.open_edge_distance(place) <= off:
         code = "open_edges"

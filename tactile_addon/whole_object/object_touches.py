@@ -78,6 +78,7 @@ class ObjectTouches:
         self.tolerance = tolerance or tolerance_of(self.surface.size, accuracy, noise)
         self._require_lengths(noise, edge)
         self.noise, self.seed, self.most, self.edge = noise, seed, most, edge
+        self.done = 0
         self._begin(())
         self._start = None
         if location is not None:
@@ -139,10 +140,10 @@ class ObjectTouches:
                 break
         yield from self.meshing(JOINED)
 
-    def _started(self) -> tuple[Generator[core.Progress, bool | None, core.Atlas], core.Progress]:
+    def _started(self) -> tuple[Generator[core.Progress, object, core.Atlas], core.Progress]:
         """The steps of core, and the Progress of the first. Raises ValueError if touches cannot begin."""
         why: Exception | str = "no face has an area"
-        begun: list[tuple[float, Any, core.Progress]] = []
+        begun: list[tuple[float, Generator[core.Progress, object, core.Atlas], core.Progress]] = []
         for point, outward in self._places():
             steps = core.touch_all_over(
                 self.surface,
@@ -159,7 +160,7 @@ class ObjectTouches:
             except ValueError as error:
                 why = error
                 continue
-            begun.append((max(map(np.mean, state.rims)), steps, state))
+            begun.append((float(max(map(np.mean, state.rims))), steps, state))
             if begun[-1][0] >= GOOD_START * self.tolerance or len(begun) == TRIES:
                 break
         if not begun:
