@@ -3,6 +3,7 @@
 """The curves of patches and of a pick's preview: contours in the colors of their planes, rims, directions."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 from itertools import cycle
 from typing import Any, cast
 
@@ -68,30 +69,41 @@ def _nearer(view: bpy.types.RegionView3D) -> Matrix:
 def draw(curves: Curves, has_contours: bool = True, has_directions: bool = False) -> None:
     """Draws Curves in the coordinates of their patch."""
     scale = bpy.context.preferences.system.ui_scale
-    lines: list[tuple[Sequence[float], Sequence[float]]] = []
+    lines: list[tuple[Sequence[float], tuple[float, ...]]] = []
     if has_contours:
         lines = [(path, WHITE) for path in curves["rim"]]
         pairs = zip(curves["contours"], cycle(PLANE_COLORS), strict=False)
         lines += [(path, (*color, 1.0)) for path, color in pairs]
     if has_directions:
         lines += [(path, BLACK) for path in curves["directions"]]
-    gpu.state.blend_set("ALPHA")
-    for path, color in lines:
-        points = np.reshape(path, (-1, 3))
-        draw_line(points, DARK, (WIDTH + 2.0 * OUTLINE) * scale)
-        draw_line(points, color, WIDTH * scale)
+    _draw_lines([(np.asarray(path, dtype=float).tobytes(), color) for path, color in lines])
     for path in curves.get("strokes", ()) if has_contours else ():
         _draw_points(np.reshape(path, (-1, 3)), STROKE * scale)
+
+
+def _draw_lines(lines: Sequence[tuple[bytes, tuple[float, ...]]]) -> None:
+    """Draws lines, each of which has float64 numbers, three a point, and a color."""
+    scale = bpy.context.preferences.system.ui_scale
+    shader = _shader()
+    gpu.state.blend_set("ALPHA")
+    for is_outline, width in ((True, WIDTH + 2.0 * OUTLINE), (False, WIDTH)):
+        shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
+        shader.uniform_float("lineWidth", width * scale)
+        _batch(tuple(lines), is_outline).draw(shader)
     gpu.state.blend_set("NONE")
 
 
-def draw_line(points: Array, color: Sequence[float], width: float) -> None:
-    """Draws a line through points (n, 3), so many pixels wide."""
-    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
-    shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
-    shader.uniform_float("lineWidth", width)
-    shader.uniform_float("color", color)
-    batch_for_shader(shader, "LINE_STRIP", {"pos": points.tolist()}).draw(shader)
+def _shader() -> gpu.types.GPUShader:
+    return gpu.shader.from_builtin("POLYLINE_SMOOTH_COLOR")
+
+
+@lru_cache(maxsize=512)  # A redraw of hundreds of patches would take too long otherwise.
+def _batch(lines: tuple[tuple[bytes, tuple[float, ...]], ...], is_outline: bool) -> gpu.types.GPUBatch:
+    """The segments of lines, in their colors or dark."""
+    pieces = [np.repeat(np.frombuffer(raw).reshape(-1, 3), 2, axis=0)[1:-1] for raw, _ in lines]
+    shades = np.repeat([DARK if is_outline else color for _, color in lines], list(map(len, pieces)), axis=0)
+    columns = {"pos": np.vstack(pieces).tolist(), "color": shades.tolist()}
+    return batch_for_shader(_shader(), "LINES", columns)
 
 
 def _draw_points(points: Array, size: float) -> None:
@@ -127,4 +139,4 @@ def draw_preview(seen: dict[str, Any]) -> None:
     with pushed:
         gpu.matrix.multiply_matrix(Matrix(frame.tolist()))
         draw(curves_of(r))
-        draw_line(np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 0.6 * r.radius)]), WHITE, WIDTH)
+        _draw_lines([(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.6 * r.radius]).tobytes(), WHITE)])

@@ -160,7 +160,7 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         settings = found.tactile_probe
         with_target = anchor.is_attached(found) if moved else self.parent
         with silent():
-            settings.target, settings.is_probe = target, True
+            settings.target, settings.is_probe, settings.lost = target, True, ""
             if with_target and found.parent != target:
                 anchor.attach(found, target)
             for name in NAMES:

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from common import FOLDER, check, data_blocks, last_report, look, open_tab, picture, picture_of_docs, until
 
 # Places in a window of 1280 by 800 with the sidebar open.
-BUTTON, OBJECT_MENU, ASIDE = (893, 470), (330, 40), (300, 180)
+BUTTON, OBJECT_MENU, ASIDE = (893, 407), (330, 40), (300, 180)
 TABLE = "verification"
 
 

@@ -251,6 +251,7 @@ def reopened(before):
     probe().tactile_probe.azimuths[2] += 0.2
     yield 1
     consistent("changed after opening")
+    yield from until(is_complete)
     check("... completed", "vertices" in patch()["tactile"], "")
     bpy.ops.ed.undo_push(message="Changed")
     yield from two_probes()
@@ -347,7 +348,7 @@ def edit_mode(target):
     check("the patch follows an edit of the mesh", not same(state(), before), state())
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.ops.ed.undo_push(message="Edited")
-    yield 1
+    yield from until(is_complete)
     check("... and is completed after it", "vertices" in patch()["tactile"], "")
 
 
