@@ -176,7 +176,6 @@ def test_faces_without_vertices_inside_are_begun_in_their_middle(empty, shape, l
     assert touched(empty, most=5)[1]["patches"] >= least
 
 
-@pytest.mark.long
 @pytest.fixture
 def begun(empty, extension):
     """A function that begins to touch the active object at a place; returns the point of the first touch."""
@@ -226,6 +225,7 @@ def test_touches_begin_where_a_patch_is_large_enough_to_go_on(empty, begun):
     assert abs(begun((0.5, 0.0, 0.0), tolerance=0.03)[2]) == pytest.approx(0.02)
 
 
+@pytest.mark.long
 def test_what_is_loose_is_no_part_of_the_object(empty, ball):
     ball.data.vertices.add(1)
     ball.data.vertices[-1].co = (1e3, 0.0, 0.0)
