@@ -27,9 +27,7 @@ from .whole_surface import WholeSurface
 TOLERANCE_SHARES = {"quick": 1.0 / 200.0, "normal": 1.0 / 500.0, "fine": 1.0 / 1250.0}
 LARGEST_TOLERANCE, LARGEST_EDGE = 0.1, 0.5  # With more, neither patches nor triangles would fit.
 STARTS = 20  # The number of places to begin that are tried, besides the one that is given.
-# A place is tried first if it has this share of the size of room, and is taken if its patch has a mean radius
-# of so many tolerances: touches would not go on from a smaller one. The best of so many tries is taken else.
-ROOM, GOOD_START, TRIES = 0.05, 5.0, 4
+ROOM = 0.05  # Places with this share of the size of room are tried first.
 HAIR = 1e-5  # Rays begin this share of the size away from a place.
 PLACES, SEED = 1000, 0  # The progress is the share of this many places on the mesh that patches cover.
 # Of all that is to be done, touching and joining are done at these shares; of touching and joining again,
@@ -143,7 +141,6 @@ class ObjectTouches:
     def _started(self) -> tuple[Generator[core.Progress, object, core.Atlas], core.Progress]:
         """The steps of core, and the Progress of the first. Raises ValueError if touches cannot begin."""
         why: Exception | str = "no face has an area"
-        begun: list[tuple[float, Generator[core.Progress, object, core.Atlas], core.Progress]] = []
         for point, outward in self._places():
             steps = core.touch_all_over(
                 self.surface,
@@ -156,17 +153,10 @@ class ObjectTouches:
                 earlier=self._earlier,
             )
             try:
-                state = next(steps)
+                return steps, next(steps)
             except ValueError as error:
                 why = error
-                continue
-            begun.append((float(max(map(np.mean, state.rims))), steps, state))
-            if begun[-1][0] >= GOOD_START * self.tolerance or len(begun) == TRIES:
-                break
-        if not begun:
-            raise ValueError(f"Touching could not begin: choose another location or tolerance ({why})")
-        _, steps, state = max(begun, key=lambda each: each[0])
-        return steps, state
+        raise ValueError(f"Touching could not begin: choose another location or tolerance ({why})")
 
     def _places(self) -> list[tuple[Any, Any]]:
         """Places where the touches may begin, with their normals, those in slits and on ridges last."""
