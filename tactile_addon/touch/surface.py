@@ -9,10 +9,10 @@ from typing import Any
 import bpy
 import numpy as np
 
-from .arrays import read_array
 from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, size_of
 from .types import Array, Object, Point, Triple
 
+VERTICES_AT_ONCE = 100_000  # So many take some megabytes; ten million took 230.
 MANY = 8  # This multiple of the vertices that are needed is looked at first, before all are.
 WALK = 8  # The most steps on the way to the nearest point of a stretched object; mostly two or three do.
 AT_VERTEX = 1e-4  # A point that is nearer to a vertex than this share of its face's size is that vertex.
@@ -49,8 +49,8 @@ class MeshSurface(PlacedMesh):
     def _co(self) -> Array:
         return coordinates(self._object)
 
-    def vertices_near(self, point: Point, radius: float, most: int | None = None) -> tuple[Array, Array]:
-        """World coordinates and normals (any length) of vertices within `radius` of a world point.
+    def vertices_near(self, point: Point, radius: float, most: int | None = None) -> Array:
+        """The vertices (n, 3) in the world within `radius` of a world point.
 
         If these are more than `most`, only each second, third, ... of them is returned.
         """
@@ -58,14 +58,21 @@ class MeshSurface(PlacedMesh):
         reach = radius * np.linalg.norm(self._inverse, ord=2)
         at, few = self._to_local(point).astype(np.float32), len(self._co) // (MANY * (most or len(self._co)))
         for stride in dict.fromkeys((max(few, 1), 1)):  # All are looked at only if some are not enough.
-            local = self._co[::stride] - at
-            near = stride * np.flatnonzero(np.einsum("ij,ij->i", local, local) <= reach**2)
+            near = stride * self._within(at, reach, stride)
             if most is not None and len(near) >= most:
                 near = near[:: math.ceil(len(near) / most)]
                 break
-        # These are all normals, because one by one a few thousand take longer than a million at once.
-        normals = read_array(self._mesh.vertex_normals, "vector", 3)
-        return self._co[near] @ self._linear.T + self._origin, normals[near] @ self._inverse
+        world = self._co[near] @ self._linear.T
+        world += self._origin
+        return world
+
+    def _within(self, at: Array, reach: float, stride: int) -> Array:
+        """Which (n,) of each `stride`th vertex are within `reach` of a place in the object, in parts."""
+        few, found = self._co[::stride], []
+        for start in range(0, len(few), VERTICES_AT_ONCE):
+            local = few[start : start + VERTICES_AT_ONCE] - at
+            found.append(start + np.flatnonzero(np.einsum("ij,ij->i", local, local) <= reach**2))
+        return np.concatenate(found)
 
     def project(self, location: Point) -> tuple[Triple, Triple, float]:
         """The (point, unit normal) of the mesh nearest to the world `location`, and the distance.
