@@ -3,6 +3,7 @@
 """A mesh object of the scene as a surface to touch: as Blender evaluates it, in world coordinates."""
 
 import math
+from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
@@ -49,10 +50,10 @@ class MeshSurface(PlacedMesh):
     def _co(self) -> Array:
         return coordinates(self._object)
 
-    def vertices_near(self, point: Point, radius: float, most: int | None = None) -> Array:
-        """The vertices (n, 3) in the world within `radius` of a world point.
+    def vertices_near(self, point: Point, radius: float, most: int | None = None) -> Iterator[Array]:
+        """The vertices in the world within `radius` of a world point, in parts (n, 3), at least one.
 
-        If these are more than `most`, only each second, third, ... of them is returned.
+        If these are more than `most`, there is only each second, third, ... of them.
         """
         # A sphere in the world is an ellipsoid in the object, which its longest axis bounds.
         reach = radius * np.linalg.norm(self._inverse, ord=2)
@@ -62,9 +63,9 @@ class MeshSurface(PlacedMesh):
             if most is not None and len(near) >= most:
                 near = near[:: math.ceil(len(near) / most)]
                 break
-        world = self._co[near] @ self._linear.T
-        world += self._origin
-        return world
+        for start in range(0, max(len(near), 1), VERTICES_AT_ONCE):
+            local = self._co[near[start : start + VERTICES_AT_ONCE]]
+            yield local @ self._linear.T + self._origin
 
     def _within(self, at: Array, reach: float, stride: int) -> Array:
         """Which (n,) of each `stride`th vertex are within `reach` of a place in the object, in parts."""
