@@ -31,6 +31,7 @@ COMMENT = re.compile(r"\n[ \t]*(?:#|//)[#/ \t,;|]*([^\n]*)")
 VERSION_AND_UNIT = re.compile(
     TITLE + r"\W*version\s*([^\s,;|]*)(?:\W*lengths in ([^,;|\t]*))?", re.IGNORECASE
 )
+UNIT = re.compile(r"(?:lengths in|(?:length )?units?)[\s:=|,;]+([^\s,;|]+)[\s,;|]*$", re.IGNORECASE)
 KEY = re.compile(rf"({'|'.join(KEYS)})(?=[\s,;:=|]|$)", re.IGNORECASE)
 LIKE_A_KEY = re.compile(r"(point|outward|noise|normal|ball)(?![a-z])", re.IGNORECASE)
 SEPARATORS = re.compile(r"[\s;:=|]+")
@@ -48,16 +49,19 @@ def comments(text: str) -> Iterator[tuple[int, str, int]]:
 def stated(name: str, text: str) -> tuple[str, dict[str, Any]]:
     """The unit of the title, or "", and the values of all other comments by key.
 
-    A comment that begins with a key and has digits, or is below the title, is read or refused; others are
-    left to other programs. Raises ValueError with the line.
+    A comment that begins with a key and has digits, or is below the title, is read or refused, and so is one
+    that is a unit; others are left to other programs. Raises ValueError with the line.
     """
     unit, values, is_titled = "", dict[str, Any](), False
     for number, comment, _ in comments(text):
         at = f"{name}, line {number}"
         title, like = VERSION_AND_UNIT.match(comment), LIKE_A_KEY.match(comment)
+        lengths = UNIT.match(comment)
         if title is not None:
             _require_known_version(at, title[1])
-            unit, is_titled = unit_named(at, (title[2] or "").strip()), True
+            unit, is_titled = _only_unit(at, unit, title[2] or ""), True
+        elif lengths is not None:
+            unit = _only_unit(at, unit, lengths[1])
         elif like is not None and (is_titled or re.search(r"\d", comment)):
             key, numbers = _key_and_numbers(at, comment, like[0].lower())
             if key in values:
@@ -78,6 +82,14 @@ def unit_named(at: str, unit: str) -> str:
     if unit and unit not in UNIT_METERS:
         raise ValueError(f'{at}: expected a unit out of {", ".join(UNIT_METERS)}, got "{unit[:40]}"')
     return unit
+
+
+def _only_unit(at: str, before: str, unit: str) -> str:
+    """The unit of this comment, or else of those before it. Raises ValueError if they differ."""
+    named = unit_named(at, unit.strip())
+    if named and before not in ("", named):
+        raise ValueError(f"{at}: expected lengths in {before}, as a comment above says, got {named}")
+    return named or before
 
 
 def _key_and_numbers(at: str, comment: str, like: str) -> tuple[str, list[float | None]]:

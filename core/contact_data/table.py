@@ -88,7 +88,7 @@ def _table(name: str, text: str, unit: str) -> rows.RowReader:
         header = re.sub(r"\s+(?=[\[(])", "", header)  # The unit belongs to the column before it.
     width, columns, of_columns = _columns(at, rows.fields_of(at, header, separator))
     if unit and of_columns not in ("", unit):
-        raise ValueError(f"{at}: expected lengths in {unit}, as the title says, got {of_columns}")
+        raise ValueError(f"{at}: expected lengths in {unit}, as a comment says, got {of_columns}")
     table = rows.RowReader(name, separator, width, columns, of_columns or unit)
     for _, first, block in rows.blocks(text, start, number + 1):
         table.add(first, block)

@@ -89,14 +89,12 @@ def total_absolute_curvature(surface: HeightField, domain: Domain) -> float:
     return h**2 * float(np.sum(np.abs(d.gaussian_curvature) * np.sqrt(1.0 + d.x**2 + d.y**2)))
 
 
-def overlapped(geometry: Geometry, vertices: ArrayLike, normals: ArrayLike) -> NDArray[np.intp]:
-    """The indices (m,) of those world vertices (n, 3) that lie over the domain; normals are (n, 3).
+def overlapped(geometry: Geometry, vertices: ArrayLike) -> NDArray[np.intp]:
+    """The indices (m,) of those world vertices (n, 3) that lie over the domain.
 
-    A closed object has another side over the same domain. So a vertex counts only if its normal points to the
-    side of the patch's normal, and it is within the radius of the tangent plane. `reachable` has whether
-    another layer of the object hides it from a finger.
+    A closed object has another side over the same domain. So a vertex counts only if it is within the radius
+    of the tangent plane. `reachable` has whether a finger on the patch could meet it.
     """
     local, radius = geometry.frame.to_local(vertices), geometry.radius
     near = np.flatnonzero((np.abs(local) <= 2.0 * radius).all(axis=1) & (np.abs(local[:, 2]) <= radius))
-    facing = near[np.asarray(normals, dtype=float)[near] @ geometry.frame.axes[:, 2] > 0.0]
-    return facing[geometry.domain.contains(local[facing, 0], local[facing, 1])]
+    return near[geometry.domain.contains(local[near, 0], local[near, 1])]

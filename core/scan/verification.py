@@ -25,24 +25,22 @@ VERTICES_AT_ONCE = 5000  # Their distances take some hundredths of a second.
 OWN_LAYER = 1e-3  # A layer within this share of the reach is the vertex's own.
 
 
-def reachable(
-    geometry: Geometry, surface: Surface, vertices: ArrayLike, normals: ArrayLike
-) -> NDArray[np.intp]:
+def reachable(geometry: Geometry, surface: Surface, vertices: ArrayLike) -> NDArray[np.intp]:
     """The indices (m,) of the overlapped world vertices (n, 3) that a finger on the patch could meet.
 
-    Nothing of `surface` hides them from above, and no other layer of it is nearer to the patch.
+    From above they are the first of `surface`, with its outside up; no other layer is nearer to the patch.
     """
-    points, ways = np.asarray(vertices), np.asarray(normals)
-    parts = [slice(i, i + POINTS_AT_ONCE) for i in range(0, len(points), POINTS_AT_ONCE)]
-    found = [part.start + _reachable(geometry, surface, points[part], ways[part]) for part in parts]
+    points = np.asarray(vertices)
+    starts = range(0, len(points), POINTS_AT_ONCE)
+    found = [i + _reachable(geometry, surface, points[i : i + POINTS_AT_ONCE]) for i in starts]
     return np.concatenate([np.empty(0, dtype=np.intp), *found])
 
 
-def _reachable(geometry: Geometry, surface: Surface, points: Array, normals: Array) -> NDArray[np.intp]:
+def _reachable(geometry: Geometry, surface: Surface, points: Array) -> NDArray[np.intp]:
     """The `reachable` ones of some vertices (n, 3)."""
-    over = overlapped(geometry, points, normals)
+    over = overlapped(geometry, points)
     up = vector_of(geometry.frame.axes[:, 2])
-    visible = [not is_hidden(surface, vector_of(point), up, 2.0 * geometry.radius) for point in points[over]]
+    visible = [_is_visible(surface, vector_of(point), up, 2.0 * geometry.radius) for point in points[over]]
     over = over[np.array(visible, dtype=bool)]
     x, y, z = geometry.frame.to_local(points[over]).T
     heights = geometry.height(x, y)
@@ -171,6 +169,19 @@ def _foot(r: Reconstruction, surface: Surface, local: Vector, distance: float) -
         return None
     point, normal = contact_of(hit, 1.0)
     return point if dot(normal, up) > 0.0 else None
+
+
+def _is_visible(surface: Surface, point: Vector, up: Vector, reach: float) -> bool:
+    """Whether a ray from `reach` above along the unit `up` meets this vertex first, from its outside.
+
+    A ray to a vertex of an edge of the surface may miss it, but then nothing hides it.
+    """
+    hair = OWN_LAYER * reach
+    hit = surface.ray_cast(along(point, up, reach), scaled(up, -1.0), reach + hair)
+    if hit is None:
+        return True
+    met, normal = contact_of(hit, 1.0)
+    return dot(along(met, point, -1.0), up) <= hair and dot(normal, up) > 0.0
 
 
 def is_hidden(surface: Surface, point: Vector, up: Vector, reach: float) -> bool:

@@ -61,13 +61,12 @@ class Verification:
     def steps(self) -> Generator[None, None, None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
         r = self._r
-        vertices, normals = self._surface.vertices_near(r.frame.origin, 2.0 * r.radius)
+        vertices = np.vstack([*self._surface.vertices_near(r.frame.origin, 2.0 * r.radius)])
         self.count, seen = len(vertices), [np.empty((0, 3))]
         yield
         for start in range(0, self.count, VERTICES_AT_ONCE):
             some = slice(start, start + VERTICES_AT_ONCE)
-            over = core.reachable(r.geometry, self, vertices[some], normals[some])
-            seen.append(vertices[some][over])
+            seen.append(vertices[some][core.reachable(r.geometry, self, vertices[some])])
             self.done = min(start + VERTICES_AT_ONCE, self.count)
             yield
         for found in core.verifying(r, self, np.vstack(seen)):

@@ -3,17 +3,18 @@
 """A mesh object of the scene as a surface to touch: as Blender evaluates it, in world coordinates."""
 
 import math
+from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
 import bpy
 import numpy as np
 
-from .arrays import read_array
 from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, size_of
 from .oriented import require_oriented
 from .types import Array, Object, Point, Triple
 
+VERTICES_AT_ONCE = 100_000  # So many take some megabytes; ten million took 230.
 MANY = 8  # This multiple of the vertices that are needed is looked at first, before all are.
 WALK = 8  # The most steps on the way to the nearest point of a stretched object; mostly two or three do.
 AT_VERTEX = 1e-4  # A point that is nearer to a vertex than this share of its face's size is that vertex.
@@ -52,23 +53,30 @@ class MeshSurface(PlacedMesh):
     def _co(self) -> Array:
         return coordinates(self._object)
 
-    def vertices_near(self, point: Point, radius: float, most: int | None = None) -> tuple[Array, Array]:
-        """World coordinates and normals (any length) of vertices within `radius` of a world point.
+    def vertices_near(self, point: Point, radius: float, most: int | None = None) -> Iterator[Array]:
+        """The vertices in the world within `radius` of a world point, in parts (n, 3), at least one.
 
-        If these are more than `most`, only each second, third, ... of them is returned.
+        If these are more than `most`, there is only each second, third, ... of them.
         """
         # A sphere in the world is an ellipsoid in the object, which its longest axis bounds.
         reach = radius * np.linalg.norm(self._inverse, ord=2)
         at, few = self._to_local(point).astype(np.float32), len(self._co) // (MANY * (most or len(self._co)))
         for stride in dict.fromkeys((max(few, 1), 1)):  # All are looked at only if some are not enough.
-            local = self._co[::stride] - at
-            near = stride * np.flatnonzero(np.einsum("ij,ij->i", local, local) <= reach**2)
+            near = stride * self._within(at, reach, stride)
             if most is not None and len(near) >= most:
                 near = near[:: math.ceil(len(near) / most)]
                 break
-        # These are all normals, because one by one a few thousand take longer than a million at once.
-        normals = read_array(self._mesh.vertex_normals, "vector", 3)
-        return self._co[near] @ self._linear.T + self._origin, normals[near] @ self._inverse
+        for start in range(0, max(len(near), 1), VERTICES_AT_ONCE):
+            local = self._co[near[start : start + VERTICES_AT_ONCE]]
+            yield local @ self._linear.T + self._origin
+
+    def _within(self, at: Array, reach: float, stride: int) -> Array:
+        """Which (n,) of each `stride`th vertex are within `reach` of a place in the object, in parts."""
+        few, found = self._co[::stride], []
+        for start in range(0, len(few), VERTICES_AT_ONCE):
+            local = few[start : start + VERTICES_AT_ONCE] - at
+            found.append(start + np.flatnonzero(np.einsum("ij,ij->i", local, local) <= reach**2))
+        return np.concatenate(found)
 
     def project(self, location: Point) -> tuple[Triple, Triple, float]:
         """The (point, unit normal) of the mesh nearest to the world `location`, and the distance.

@@ -11,6 +11,7 @@ import os
 import re
 import subprocess
 import sys
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -629,3 +630,20 @@ def test_the_menus_offer_what_core_offers(extension):
     settings = extension.tactile_addon.touch.settings
     assert tuple(name for name, _, _ in settings.METHODS) == extension.core.METHODS
     assert tuple(name for name, _, _ in settings.SOLVERS) == extension.core.SOLVERS
+
+
+def test_vertices_near_a_point_take_little_more_memory_than_themselves(empty, extension):
+    """Sums over all vertices, and their normals, took gigabytes where there are ten million."""
+    empty.ops.mesh.primitive_grid_add(x_subdivisions=700, y_subdivisions=700, size=2.0)
+    obj, depsgraph = empty.context.object, empty.context.evaluated_depsgraph_get()
+    surface = extension.tactile_addon.touch.surface.MeshSurface(obj, depsgraph)
+    tracemalloc.start()
+    try:
+        near = np.vstack([*surface.vertices_near((0.2, 0.1, 0.0), 0.1003)])
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    vertices = np.array([v.co for v in obj.data.vertices])
+    gaps = np.linalg.norm(vertices - (0.2, 0.1, 0.0), axis=1)
+    assert len(near) == np.count_nonzero(gaps <= 0.1003) > 1000
+    assert peak < 8 * len(vertices)

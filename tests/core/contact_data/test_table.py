@@ -111,10 +111,24 @@ def test_the_unit_of_the_title_is_that_of_columns_which_name_none():
     assert core.contacts_from_csv(TITLE + plain).unit == "mm"
     assert core.contacts_from_csv(TITLE.replace("mm", "no unit") + CURVES).unit == "mm"
     assert core.contacts_from_csv(TITLE.replace("mm", "no unit") + plain).unit == ""
-    with pytest.raises(ValueError, match="line 2: expected lengths in cm, as the title says, got mm"):
+    with pytest.raises(ValueError, match="line 2: expected lengths in cm, as a comment says, got mm"):
         core.contacts_from_csv(TITLE.replace("mm", "cm") + CURVES)
     with pytest.raises(ValueError, match=r'line 1: expected a unit out of km, m, .* got "furlongs"'):
         core.contacts_from_csv(TITLE.replace("mm", "furlongs") + plain)
+
+
+@pytest.mark.parametrize(
+    "words", ["unit mm", "units: mm", "Unit = mm", "length unit: mm;;;", "lengths in mm"]
+)
+def test_a_comment_that_is_a_unit_is_read_or_refused(words):
+    plain = CURVES.replace(" [mm]", "")
+    assert core.contacts_from_csv(f"# {words}\n{plain}").unit == "mm"
+    assert core.contacts_from_csv(f"{plain}# {words}\n").unit == "mm"
+    assert core.contacts_from_csv(f"# unit of the robot: mm\n{plain}").unit == ""
+    with pytest.raises(ValueError, match=r'line 1: expected a unit out of km, m, .* got "furlongs"'):
+        core.contacts_from_csv(f"# {words.replace('mm', 'furlongs')}\n{plain}")
+    with pytest.raises(ValueError, match="line 2: expected lengths in cm, as a comment above says, got mm"):
+        core.contacts_from_csv(f"{TITLE.strip().replace('mm', 'cm')}\n# {words}\n{plain}")
 
 
 def test_a_ball_is_written_and_versions_that_are_not_known_are_refused():

@@ -24,6 +24,7 @@ from core import (
     distances,
     mean_height_stds,
     overlapped,
+    reachable,
     reconstruct,
     reconstruct_many,
     track,
@@ -181,8 +182,9 @@ def test_distances_of_mesh_vertices_over_the_domain():
     r = ball.fit(contours, weight=1e5)
     directions = np.random.default_rng(0).normal(size=(20000, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    vertices, normals = np.vstack([25 * directions, 22 * directions]), np.vstack([directions, -directions])
-    over = overlapped(r.geometry, vertices, normals)
+    vertices = np.vstack([25 * directions, 22 * directions])
+    assert set(reachable(r.geometry, ball, vertices)) < set(overlapped(r.geometry, vertices))
+    over = reachable(r.geometry, ball, vertices)
     expected = 20000 * (1 - np.cos(8 / 25)) / 2
     assert len(over) == pytest.approx(expected, rel=0.15)
     assert np.linalg.norm(vertices[over], axis=1) == pytest.approx(25.0)

@@ -46,15 +46,13 @@ def shifted(r, length):
 
 
 def vertices_of(surface, r, count=400):
-    """Points of the surface over the domain, as a fine mesh has vertices there, and normals."""
+    """Points of the surface over the domain, as a fine mesh has vertices there."""
     points, heights = surfaces.heights_over(surface, r, count)
-    world = r.frame.to_world(np.column_stack([points, heights]))
-    normals = np.array([surface.gradient(point) for point in world])
-    return world, normals
+    return r.frame.to_world(np.column_stack([points, heights]))
 
 
-def seen(r, surface, vertices, normals):
-    return vertices[reachable(r.geometry, surface, vertices, normals)]
+def seen(r, surface, vertices):
+    return vertices[reachable(r.geometry, surface, vertices)]
 
 
 class Cut:
@@ -81,7 +79,7 @@ class Cut:
 def test_a_patch_on_its_own_surface(name):
     surface = SURFACES[name]
     r = touched(surface)
-    found = verify(r, surface, seen(r, surface, *vertices_of(surface, r)))
+    found = verify(r, surface, seen(r, surface, vertices_of(surface, r)))
     assert (found["contacts"], found["extra_contours"]) == (60, 9)
     assert found["vertices"] > 350
     assert 150 < found["extra_points"] <= 9 * 24
@@ -99,7 +97,7 @@ def test_a_patch_off_its_surface_by_a_known_length(length):
     for name, vertex in (("plane", 1.0), ("sphere", None)):
         surface = SURFACES[name]
         r = shifted(touched(surface), length)
-        found = verify(r, surface, seen(r, surface, *vertices_of(surface, r)))
+        found = verify(r, surface, seen(r, surface, vertices_of(surface, r)))
         assert found["overlap"] == 1.0
         assert found["extra_contours"] == 9
         assert found["contact_distance_max"] < 1e-3
@@ -108,7 +106,7 @@ def test_a_patch_off_its_surface_by_a_known_length(length):
                 assert found[f"vertex_distance_{key}"] == pytest.approx(abs(length))
             assert found["extra_fit_error"] == pytest.approx(abs(length))
         else:  # the foot on a ball shifted by e n is |p - e n| - R from p
-            points = seen(r, surface, *vertices_of(surface, r))
+            points = seen(r, surface, vertices_of(surface, r))
             expected = np.abs(np.linalg.norm(points - length * surface.normal, axis=1) - 30.0)
             assert found["vertex_distance_mean"] == pytest.approx(expected.mean(), rel=2e-3)
             assert found["vertex_distance_median"] == pytest.approx(np.median(expected), rel=2e-3)
@@ -187,10 +185,10 @@ def test_half_of_the_mesh(name):
 def test_what_another_layer_hides_does_not_count():
     surface = SURFACES["plane"]
     r = touched(surface)
-    vertices, normals = vertices_of(surface, r)
+    vertices = vertices_of(surface, r)
     direction = r.frame.axes[:, 1]
     roofed = Cut(surface, r.frame.origin, direction, roof=1.5 * r.radius)
-    over = seen(r, roofed, vertices, normals)
+    over = seen(r, roofed, vertices)
     assert ((over - r.frame.origin) @ direction >= 0.0).all()
     assert len(over) == pytest.approx(len(vertices) / 2, rel=0.05)
     assert verify(r, roofed, over)["overlap"] == pytest.approx(0.5, abs=0.03)
@@ -201,13 +199,13 @@ def test_another_layer_than_the_nearest_does_not_count():
     surface = SURFACES["plane"]
     r = touched(surface)
     up, direction = r.frame.axes[:, 2], r.frame.axes[:, 1]
-    vertices, normals = vertices_of(surface, r)
+    vertices = vertices_of(surface, r)
     roofed = Cut(surface, r.frame.origin, direction, roof=0.3 * r.radius)
     on_roof = (vertices - r.frame.origin) @ direction < 0.0
-    assert len(seen(r, roofed, vertices[on_roof] + 0.3 * r.radius * up, normals[on_roof])) == 0
+    assert len(seen(r, roofed, vertices[on_roof] + 0.3 * r.radius * up)) == 0
     lifted = shifted(r, 0.3 * r.radius)  # a patch on the roof; off it, the plane is the nearest layer
-    assert len(seen(lifted, roofed, vertices[on_roof] + 0.3 * r.radius * up, normals[on_roof])) > 50
-    assert len(seen(lifted, roofed, vertices[~on_roof], normals[~on_roof])) > 50
+    assert len(seen(lifted, roofed, vertices[on_roof] + 0.3 * r.radius * up)) > 50
+    assert len(seen(lifted, roofed, vertices[~on_roof])) > 50
 
 
 def test_further_contours_begin_below_an_overhang():
@@ -223,7 +221,7 @@ def test_further_contours_begin_below_an_overhang():
 def test_no_mesh_below():
     surface = SURFACES["plane"]
     r = shifted(touched(surface), 3.0 * EXTENT)
-    found = verify(r, surface, seen(r, surface, *vertices_of(surface, touched(surface))))
+    found = verify(r, surface, seen(r, surface, vertices_of(surface, touched(surface))))
     assert [found[key] for key in ("vertices", "extra_contours", "extra_points", "overlap")] == [0, 0, 0, 0.0]
     assert not {"vertex_distance_mean", "extra_fit_error"} & set(found)
     turned = touched(surface).moved(similarity(turn=np.diag([1.0, -1.0, -1.0])))
@@ -250,7 +248,7 @@ def test_lengths_scale_and_ratios_stay(scale):
     surface = surfaces.pear()
     r = touched(surface, noise=0.05, degree=4)
     turn, shift = Rotation.from_rotvec([0.4, -0.9, 0.3]).as_matrix(), scale * np.array([20.0, -7.0, 3.0])
-    vertices = seen(r, surface, *vertices_of(surface, r))
+    vertices = seen(r, surface, vertices_of(surface, r))
     one = verify(r, surface, vertices)
     moved = r.moved(similarity(scale, turn, shift))
     other = verify(moved, Moved(surface, turn, scale, shift), scale * vertices @ turn.T + shift)
@@ -289,8 +287,8 @@ def test_what_is_farther_from_the_tangent_plane_than_the_radius_is_not_below_the
     surface = surfaces.plane()
     r = shifted(touched(surface), side * height * touched(surface).radius)
     assert verify(r, surface, np.empty((0, 3)), extra=0)["overlap"] == share
-    vertices, normals = vertices_of(surface, touched(surface))
-    assert (len(reachable(r.geometry, surface, vertices, normals)) > 0) == (share > 0.0)
+    vertices = vertices_of(surface, touched(surface))
+    assert (len(reachable(r.geometry, surface, vertices)) > 0) == (share > 0.0)
 
 
 @pytest.mark.parametrize(("height", "hides"), [(1.9, True), (2.1, False)])
