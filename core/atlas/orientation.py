@@ -165,16 +165,15 @@ def _bridged(
         count, piece = connected_pieces(i, j, len(points))
         if count == 1:
             return i, j, weights
-        largest = np.bincount(piece).argmax()
-        for one in (k for k in range(count) if k != largest):
-            mine, others = np.flatnonzero(piece == one), np.flatnonzero(piece != one)
-            away, near = cKDTree(points[others]).query(points[mine])
-            some = np.argsort(away, kind="stable")[:BRIDGES]
-            a, b = mine[some], others[near[some]]
-            i, j = np.append(i, a), np.append(j, b)
-            # They come after all links of neighbors, the shortest first.
-            far = 2.0 + away[some] / np.ptp(points, axis=0).max()
-            weights = np.append(weights, far + _weights(points, normals, a, b))
+        is_mine = piece == np.bincount(piece).argmin()
+        mine, others = np.flatnonzero(is_mine), np.flatnonzero(~is_mine)
+        away, near = cKDTree(points[others]).query(points[mine])
+        some = np.argsort(away, kind="stable")[:BRIDGES]
+        a, b = mine[some], others[near[some]]
+        i, j = np.append(i, a), np.append(j, b)
+        # They come after all links of neighbors, the shortest first.
+        far = 2.0 + away[some] / np.ptp(points, axis=0).max()
+        weights = np.append(weights, far + _weights(points, normals, a, b))
 
 
 def _propagated_signs(
