@@ -92,8 +92,9 @@ def cover_contacts(
     radius, noise = yield from cloud.least_radius_and_noise(radius)
     found, charts = yield from _patches(cloud._replace(noise=noise), radius)
     reference = yield from part_of(joined_surface(found, charts, largest, contacts.off), 1.0, 1.0)
-    uncovered = uncovered_places(reference, charts)
-    atlas = Atlas(tuple(found), charts, reference, largest, uncovered, contacts=contacts)
+    atlas = Atlas(
+        tuple(found), charts, reference, largest, uncovered_places(reference, charts), contacts=contacts
+    )
     most = largest or GROWN * radius
     off_surface = partial(_off_surface, atlas, noise, most)
     distances, far, is_turned = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
@@ -211,8 +212,7 @@ def _beyond_bend(centers: Array, contacts: Array, links: Indices) -> tuple[str, 
     There kappa_center < -1 / r, and contacts (n, 3) lie the other way around than their centers.
     """
     ways, below = (points[links] - points[:, None] for points in (centers, contacts))
-    turned = row_dot(ways, below) < -TURNED * row_dot(ways, ways)
-    beyond = turned.mean(axis=1) > TURNED
+    beyond = (row_dot(ways, below) < -TURNED * row_dot(ways, ways)).mean(axis=1) > TURNED
     if beyond.mean() <= TURNED:
         return None
     return "uncertain", (
@@ -277,13 +277,15 @@ def _agreement(
     )
     if far.mean() <= FEW and len(worst) <= len(QUADRIC):
         return "ok", f"The surface is closed. All but {off} agree with it, which are off {where}."
-    advice = ": feel more there, or give their noise."
     if is_turned[worst].any():
-        advice = (
-            ". Strokes there are farther apart than half of the wall or gap, so its sides may be confused: "
-            "make strokes nearer to each other, or measure normals."
+        return "uncertain", (
+            f"{off} are off the surface or face the other way, {where}. Strokes there are farther apart than "
+            "half of the wall or gap, so its sides may be confused: make strokes nearer to each other, or "
+            "measure normals."
         )
-    return "uncertain", f"{off} are off the surface or face the other way, {where}{advice}"
+    return "uncertain", (
+        f"{off} are off the surface or face the other way, {where}: feel more there, or give their noise."
+    )
 
 
 class _Cloud(NamedTuple):

@@ -16,8 +16,9 @@ APART = 0.8  # Places are at least this many radii of the adjacent patch from ea
 
 def place_at(point: Array, normal: Array, radius: float, area: float | None = None) -> RimPlace:
     """A place for a touch of this radius, at a point (3,) with its normal (3,)."""
-    up = vector_of(normal)
-    return RimPlace(vector_of(point), up, tangent_of(up, None), radius, area=area)
+    return RimPlace(
+        vector_of(point), vector_of(normal), tangent_of(vector_of(normal), None), radius, area=area
+    )
 
 
 def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[RimPlace, ...]:
@@ -29,7 +30,7 @@ def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[RimPlace
 
     mesh, unfelt, found = reference.mesh, reference.unfelt, list[RimPlace]()
     if unfelt is None or not reference.is_open.any():
-        return ()
+        return tuple(found)
     rim, ups = mesh.vertices[reference.is_open], mesh.normals[reference.is_open]
     radii = charts.radii[cKDTree(charts.origins).query(rim)[1]]
     # A vertex has a third of the area of its triangles.
