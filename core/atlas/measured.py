@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import SMALLEST, Array, list_of, number, unit_vector, unit_vectors
 from ..bayes.joint_fit import MISFIT
-from ..contours.contour import Contour, equal_points, tangent_of, vector_of
+from ..contours.contour import Contour, equal_points
 from ..patch.monge import QUADRIC
 from ..reconstruction.explained import FEW, are_few, too_far
 from ..reconstruction.from_contours import reconstruct_many
@@ -24,12 +24,11 @@ from ..verdict import Doubt, beyond
 from .charts import AZIMUTHS, Charts
 from .connectivity import Indices, connected_pieces
 from .finger import FACING
-from .frontier import RimPlace
 from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
 from .object_atlas import AT_ONCE, Atlas, joined_surface
 from .orientation import doubts_of, oriented, place_text, planes_of, sharpened
-from .unfelt import uncovered_places
+from .unfelt import place_at, uncovered_places
 
 # python -m benchmarks.robot judges these.
 FEWEST = 40  # The smallest patch has this many contacts.
@@ -87,15 +86,16 @@ def cover_contacts(
 
     largest = None if tolerance is None else number("tolerance", tolerance, above=0.0)
     noise = None if noise is None else number("noise", noise, least=0.0)
-    strokes, noise, radius = _strokes(contours_or_strokes, noise, largest)
-    contacts, doubts = _contacts(strokes, outward, noise)
+    felt, noise, radius = _felt(contours_or_strokes, noise, largest)
+    contacts, doubts = _contacts(*felt, outward, noise)
     cloud = _Cloud(contacts, cKDTree(contacts.points), noise, largest)
     yield 0.0
     radius, noise = yield from cloud.least_radius_and_noise(radius)
     found, charts = yield from _patches(cloud._replace(noise=noise), radius)
     reference = yield from part_of(joined_surface(found, charts, largest, contacts.off), 1.0, 1.0)
-    uncovered = uncovered_places(reference, charts)
-    atlas = Atlas(tuple(found), charts, reference, largest, uncovered, contacts=contacts)
+    atlas = Atlas(
+        tuple(found), charts, reference, largest, uncovered_places(reference, charts), contacts=contacts
+    )
     most = largest or GROWN * radius
     off_surface = partial(_off_surface, atlas, noise, most)
     distances, far, is_turned = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
@@ -106,29 +106,19 @@ def cover_contacts(
         atlas,
         contradictions=tuple(doubts),
         agreement=_agreement(contacts, distances, far, worst, 0.0 if cloud.noise else noise),
-        unexplained=tuple(_place_at(contacts, i, radius) for i in worst[: len(off)]),
+        unexplained=tuple(
+            place_at(contacts.points[i], contacts.normals[i], radius) for i in worst[: len(off)]
+        ),
     )
 
 
-class _Strokes(NamedTuple):
-    """Contacts of strokes, each once.
-
-    points, normals : (n, 3); normals as they were given, or 0
-    stroke : (n,), the stroke of each
-    known, balls : (n,), whether it has a normal, and the radius of the ball whose center it is, or 0
-    """
-
-    points: Array
-    normals: Array
-    stroke: Indices
-    known: NDArray[np.bool_]
-    balls: Array
-
-
-def _strokes(
+def _felt(
     given: Sequence[ArrayLike | Contour], noise: float | None, tolerance: float | None
-) -> tuple[_Strokes, float, float]:
-    """The contacts of all strokes, their noise and the least radius of a patch, checked."""
+) -> tuple[tuple[Array, Array, Indices, Array], float, float]:
+    """The arguments of `_contacts`: all contacts, each once; their noise, and the least radius of a patch.
+
+    Raises ValueError for contacts that are too few or too near, and for a noise or a tolerance that is large.
+    """
     curves = [
         curve if isinstance(curve, Contour) else Contour(curve)  # type: ignore[arg-type]
         for curve in list_of("contours_or_strokes", given, object)  # type: ignore[arg-type]
@@ -148,21 +138,24 @@ def _strokes(
             f"tolerance: expected at most {COARSEST * size:.3g}, a tenth of the size, got {tolerance:.3g}"
         )
     stroke = np.repeat(np.arange(len(curves)), [len(curve.points) for curve in curves])[once]
-    known = np.array([curve.normals is not None for curve in curves])[stroke]
     balls = np.array([curve.ball or 0.0 for curve in curves])[stroke]
-    normals = np.vstack([0.0 * curve.points if curve.normals is None else curve.normals for curve in curves])
-    return _Strokes(points, normals[once], stroke, known, balls), noise, radius
+    normals = [0.0 * c.points + np.nan if c.normals is None else c.normals for c in curves]
+    return (points, np.vstack(normals)[once], stroke, balls), noise, radius
 
 
 def _contacts(
-    strokes: _Strokes, outward: ArrayLike | None, noise: float
+    points: Array, normals: Array, stroke: Indices, balls: Array, outward: ArrayLike | None, noise: float
 ) -> tuple[MeasuredContacts, list[Doubt]]:
-    """The contacts of strokes with outward normals, and why the normals are in doubt."""
+    """Contacts with outward normals, and why these are in doubt, if they are.
+
+    points, normals : (n, 3); normals as they were measured, or NaN
+    stroke, balls : (n,), the stroke of each, and the radius of the ball whose center it is, or 0
+    """
     up = None if outward is None else unit_vector("outward", outward)
-    (points, normals, stroke, known, balls), planes = strokes, planes_of(strokes.points, noise)
+    known, planes = np.isfinite(normals[:, 0]), planes_of(points, noise)
     normals[known] = unit_vectors("normals", normals[known])
     if not known.all():
-        normals[~known] = oriented(points, planes, stroke, normals, up)[~known]
+        normals[~known] = oriented(points, planes, stroke, np.where(known[:, None], normals, 0.0), up)[~known]
     else:
         _require_one_side(points, normals)
     doubts = list(doubts_of(points, normals, planes))
@@ -225,8 +218,7 @@ def _beyond_bend(centers: Array, contacts: Array, links: Indices) -> Iterator[Do
     There kappa_center < -1 / r, and contacts (n, 3) lie the other way around than their centers.
     """
     ways, below = (points[links] - points[:, None] for points in (centers, contacts))
-    turned = row_dot(ways, below) < -TURNED * row_dot(ways, ways)
-    beyond = turned.mean(axis=1) > TURNED
+    beyond = (row_dot(ways, below) < -TURNED * row_dot(ways, ways)).mean(axis=1) > TURNED
     if beyond.mean() > TURNED:
         yield Doubt("ball", float(beyond.mean()), TURNED, (place_text(centers[beyond]),))
 
@@ -296,12 +288,6 @@ def _agreement(
     if noise:
         message += f" No noise was given; that of the fit is {noise:.2g}."
     return message
-
-
-def _place_at(contacts: MeasuredContacts, i: int, radius: float) -> RimPlace:
-    """Contact i as a place for a touch of this radius."""
-    point, up = vector_of(contacts.points[i]), vector_of(contacts.normals[i])
-    return RimPlace(point, up, tangent_of(up, None), radius)
 
 
 class _Cloud(NamedTuple):
@@ -423,7 +409,7 @@ def _patches(cloud: _Cloud, radius: float) -> Generator[float, None, tuple[list[
         if r is None:  # At an edge there are no contacts on one side of it.
             middle = cloud.middle(i, radius)
             r, last = cloud.longest_sure(middle, radii, last)
-        left[cloud.same_sheet(i, MISSING * radius) if r is None else i] = False
+        left[cloud.same_sheet(i, MISSING * radius)] = False
         if r is not None:
             found.append(r)
             tables.append(tabulate(r, cloud.rim(middle, r), deviations=True))

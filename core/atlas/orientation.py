@@ -66,9 +66,8 @@ def planes_of(points: Array, noise: float) -> Planes:
     tree, n = cKDTree(points), len(points)
     normals, (reach, areas, rms), best = np.zeros((n, 3)), np.zeros((3, n)), np.full(n, np.inf)
     links = np.zeros((n, LINKS), dtype=np.intp)
-    left, count = np.arange(n), FEWEST
+    left, count = np.arange(n), min(FEWEST, n)
     while len(left):
-        count = min(count, n)
         for some in np.array_split(left, len(left) * count // (AT_ONCE * FEWEST) + 1):
             away, near = tree.query(points[some], count)
             off = points[near] - points[near].mean(axis=1, keepdims=True)
@@ -86,7 +85,7 @@ def planes_of(points: Array, noise: float) -> Planes:
         left = (
             left[(best[left] > FLAT) | (reach[left] < NOISES * noise)] if count < min(n, MOST) else left[:0]
         )
-        count = int(MORE * count)
+        count = min(int(MORE * count), n)
     return Planes(normals, reach, areas, np.maximum(rms, noise), links)
 
 
@@ -125,14 +124,13 @@ def oriented(
 ) -> Array:
     """Outward unit normals (n, 3) of points (n, 3) with planes.
 
-    stroke : (n,), the number of the stroke of each
+    stroke : (n,), the stroke of each
     known : (n, 3), measured unit normals; 0 where there are none
     up : (3,), a hint, a direction to the outer side
 
     Raises ValueError if nothing tells the outer side.
     """
-    links = _links(points, planes, stroke)
-    links = _bridged(points, planes.normals, *links)
+    links = _bridged(points, planes.normals, *_links(points, planes, stroke))
     sides, order, ends = _propagated_signs(points, planes.normals, *links)
     normals = sides[:, None] * planes.normals
     turns, number = _winding_signs(points[order], normals[order], planes.areas[order], ends)
@@ -146,9 +144,9 @@ def _links(points: Array, planes: Planes, stroke: Indices) -> tuple[Indices, Ind
     before = np.flatnonzero(np.diff(stroke) == 0)
     step = np.linalg.norm(points[before + 1] - points[before], axis=1)
     before = before[step < STEP * planes.reach[before]]
-    factor = np.repeat([1.0, STROKE], [len(i), len(before)])
     i, j = np.append(i, before), np.append(j, before + 1)
-    return i, j, factor * _weights(points, planes.normals, i, j)
+    factors = np.repeat([1.0, STROKE], [planes.links.size, len(before)])
+    return i, j, factors * _weights(points, planes.normals, i, j)
 
 
 def _weights(points: Array, normals: Array, i: Indices, j: Indices) -> Array:
@@ -167,16 +165,15 @@ def _bridged(
         count, piece = connected_pieces(i, j, len(points))
         if count == 1:
             return i, j, weights
-        largest = np.bincount(piece).argmax()
-        for one in (k for k in range(count) if k != largest):
-            mine, others = np.flatnonzero(piece == one), np.flatnonzero(piece != one)
-            away, near = cKDTree(points[others]).query(points[mine])
-            some = np.argsort(away, kind="stable")[:BRIDGES]
-            a, b = mine[some], others[near[some]]
-            i, j = np.append(i, a), np.append(j, b)
-            # They come after all links of neighbors, the shortest first.
-            far = 2.0 + away[some] / np.ptp(points, axis=0).max()
-            weights = np.append(weights, far + _weights(points, normals, a, b))
+        is_mine = piece == np.bincount(piece).argmin()
+        mine, others = np.flatnonzero(is_mine), np.flatnonzero(~is_mine)
+        away, near = cKDTree(points[others]).query(points[mine])
+        some = np.argsort(away, kind="stable")[:BRIDGES]
+        a, b = mine[some], others[near[some]]
+        i, j = np.append(i, a), np.append(j, b)
+        # They come after all links of neighbors, the shortest first.
+        far = 2.0 + away[some] / np.ptp(points, axis=0).max()
+        weights = np.append(weights, far + _weights(points, normals, a, b))
 
 
 def _propagated_signs(
@@ -280,5 +277,5 @@ def doubts_of(points: Array, normals: Array, planes: Planes) -> Iterator[Doubt]:
 
 def place_text(points: Array) -> str:
     """The one of points (n, 3) that is nearest to their median, as text in a sentence."""
-    best = points[np.argmin(((points - np.median(points, axis=0)) ** 2).sum(axis=1))]
-    return "(" + ", ".join(f"{x:.3g}" for x in best) + ")"
+    away = np.linalg.norm(points - np.median(points, axis=0), axis=1)
+    return "(" + ", ".join(f"{x:.3g}" for x in points[np.argmin(away)]) + ")"

@@ -145,6 +145,20 @@ def test_contacts_that_no_patch_explains_are_counted_and_named():
     assert touch.outward @ (0.6, 0.0, 0.8) > 0.8
 
 
+@pytest.mark.long
+def test_a_gap_that_is_narrower_than_strokes_are_apart_is_a_doubt_that_names_it():
+    one = [0.5 * ring for ring in rings_of_ball(gap=0.2)]
+    two = [ring + np.array([1.02, 0.0, 0.0]) for ring in one]
+    for hint in (None, (0.0, 0.0, 1.0)):
+        atlas = core.atlas_of([*one, *two], outward=hint)
+        middles = np.where(atlas.contacts.points[:, :1] > 0.51, (1.02, 0.0, 0.0), (0.0, 0.0, 0.0))
+        outward = np.einsum("ni,ni->n", atlas.contacts.normals, atlas.contacts.points - middles) > 0.0
+        assert outward.mean() > 0.97
+        assert atlas.status == "uncertain"
+        assert "Strokes there are farther apart than half of the wall or gap, so its" in atlas.message
+        assert np.linalg.norm(atlas.next_touch().point - np.array([0.51, 0.0, 0.0])) < 0.2
+
+
 def test_a_noise_that_was_not_given_is_named():
     assert re.search(r"No noise was given; that of the fit is 0\.001\d?\.$", ball_atlas().message)
 
