@@ -54,10 +54,6 @@ CLOSE, COARSE = 0.95, 1.8  # The distance between strokes, in halves of a wall.
 # benchmarks.atlas touches it, too, where its thinnest walls are not resolved.
 WALLS = {"cad_block": 0.0064}
 RIGHT, FEWEST, MOST = 0.99, 100, 200_000  # With fewer right normals, of this many contacts, a doubt is due.
-TOLERANCE, EXTENT = (
-    0.3,
-    6.0,
-)  # Of the pebble of examples/robot.py, in mm, and the length of a half curve there.
 GAP = 0.01  # A tenth of the distance between two balls.
 GAPS = (0.03, 0.06)  # The least and the largest distance between the strokes of a scan.
 FINE = 0.5  # Contacts along a stroke are this share of the gap apart.

@@ -65,7 +65,6 @@ class Row(NamedTuple):
     mesh: int | None
 
 
-PAPER_CURVATURES = (-0.0423, 0.0172)
 PAPER_FIGURES = {
     LEAST_SQUARES: Figures(0.0461, 13.0041, 16.6031),
     TAGC: Figures(0.0514, 0.0859, 0.0329),

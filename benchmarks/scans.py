@@ -20,14 +20,6 @@ class Scan(NamedTuple):
     unit: str
     scale: float
 
-    @property
-    def title(self):
-        return f"{self.name}, {self.scale * self.extent:g} {self.unit}"
-
-    @property
-    def lengths(self):
-        return {"extent": self.extent, "step": self.extent / self.steps, "noise": self.noise}
-
 
 # Renders and mesh curvature led to these places: the pear's belly, the lemon's side, the hollow shoulder
 # under the bottle's cap (a saddle, like the paper's), and the great saddle of Eros (an extent of 2 km was
