@@ -28,3 +28,21 @@ def test_a_slice_is_as_long_as_the_redraw_before_it(extension):
     assert 0.5 * in_slices.LONGEST_SLICE <= operator._slice() <= in_slices.LONGEST_SLICE
     operator._worked = perf_counter() + 60.0
     assert operator._slice() == in_slices.TIMER_SLICE
+
+
+def test_the_time_that_is_left_is_said_once_a_little_is_done(extension):
+    operator = extension.tactile_addon.probes.in_slices.InSlices()
+    operator._begun = perf_counter() - 10.0
+    for share, words in ((None, "Joining"), (0.01, "Joining"), (0.25, "Joining, 30 s left")):
+        operator._done = lambda share=share: ("Joining", share)
+        assert operator._said() == (words, share)
+
+
+def test_the_button_of_the_panel_asks_the_latest_to_stop(extension, empty):
+    in_slices = extension.tactile_addon.probes.in_slices
+    first, latest = in_slices.InSlices(), in_slices.InSlices()
+    in_slices._running[:] = [first, latest]
+    assert empty.ops.tactile.stop() == {"FINISHED"}
+    in_slices._running.clear()
+    assert (first._is_asked, latest._is_asked) == (False, True)
+    assert empty.ops.tactile.stop() == {"FINISHED"}  # There is nothing to stop.
