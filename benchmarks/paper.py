@@ -334,7 +334,7 @@ def main():
         print(f"All rows of scans and Table I are skipped, because there are no scans in {SCANS_FOLDER}.\n")
     print_figures(measured)
     print_table(tested)
-    print(f"Pictures: {paper_pictures.OUTPUT}/*.jpg" if draws else "No pictures: matplotlib is missing.")
+    print("Pictures: build/paper/*.jpg" if draws else "No pictures: matplotlib is missing.")
 
 
 def _caption():

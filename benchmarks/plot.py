@@ -34,7 +34,7 @@ def save(figure, name, caption, header, rows):
     with open(OUTPUT / f"{name}.csv", "w", newline="", encoding="utf-8") as file:
         file.write(f"# {caption}\r\n")
         csv.writer(file).writerows([header, *rows])
-    print(f"{OUTPUT / name}.png and .csv")
+    print(f"{(OUTPUT / name).relative_to(ROOT)}.png and .csv")
 
 
 def stored(name):
