@@ -49,7 +49,7 @@ PROMISES = [
     ("viewport", "less than a twentieth of a second", 20 * of_the_add_on("probes/change_handlers", "CHEAP")),
     ("viewport", "six in all at most", of_the_add_on("touch/settings", "MOST_PLANES") / 6),
     ("viewport", "at most half the object's size", 2 * of_the_add_on("touch/touch_object", "FARTHEST_SHARE")),
-    ("maps", "is a quarter of the extent", 4 * of_the_add_on("stability_map/stability", "SPACING_SHARE")),
+    ("maps", "is half of the extent", 2 * of_the_add_on("stability_map/stability", "SPACING_SHARE")),
     ("patch", "accurate to # % of the radius", 100 * status.DOUBTFUL_STD),
     ("patch", "may be off by #°", math.degrees(status.DOUBTFUL_TURN)),
     ("patch", "off the surface by # of the standard deviation", result.MESH_SHARE),
