@@ -19,6 +19,8 @@ from itertools import islice
 from pathlib import Path
 from statistics import median
 
+import numpy as np
+
 from tools import blender, demo
 
 from . import SCANS_FOLDER, machine, table
@@ -127,15 +129,17 @@ def _draw(extension):
         (obj,) = bpy.context.scene.objects
         bpy.ops.tactile.reconstruct(target=obj.name, location=place)
         patch = bpy.context.view_layer.objects.active
-        (lines,) = patch.children
         normal = patch.matrix_world.col[2].xyz.normalized()
         up = Vector((0, 0, 1)) if abs(normal.z) < 0.8 else Vector((0, 1, 0))
         view = (normal + 0.35 * up + 0.3 * up.cross(normal)).normalized()
         width = share * max(obj.dimensions)
-        # The curves come nearer to the camera, so that the patch does not hide them.
-        lines.delta_location = patch.matrix_world.to_3x3().inverted() @ (0.05 * width * view)
         demo.look(bpy.context.scene, obj)
-        Stage(extension, bpy.context.scene).photograph(name, patch.location, view, up, width, [patch])
+        stage = Stage(extension, bpy.context.scene)
+        contours, ink = extension.reconstruction_of(patch).contours, stage.ink("brown")
+        # The curves come nearer to the camera, so that the patch does not hide them.
+        ahead = 0.05 * width * np.array(view)
+        lines = [stage.line(curve.points + ahead, 0.004 * width, ink) for curve in contours]
+        stage.photograph(name, patch.location, view, up, width, [patch, *lines])
     sheet("extent", [list(PICTURES)], list(PICTURES), [""], "")
 
 
