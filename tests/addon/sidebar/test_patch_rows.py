@@ -166,7 +166,7 @@ def test_panels_have_the_scene_s_unit_unless_numbers_in_it_would_be_long(extensi
     units, scene = extension.tactile_addon.touch.units, empty.context.scene
     assert scene.unit_settings.length_unit == "METERS"
     assert [units.unit_of(scene, size)[0] for size in (5.0, 0.05, 0.012, 0.005)] == ["m", "cm", "cm", "mm"]
-    record = {"radius": 0.01, "size": 0.05, "tolerance": 2e-4, "height_std": 1e-5, "color_limit": 48.0}
+    record = {"radius": 0.01, "size": 0.2, "tolerance": 2e-4, "height_std": 1e-5, "color_limit": 48.0}
     assert extension.tactile_addon.whole_object.object_report.unit_of(record)[0] == "cm"
     empty.ops.mesh.primitive_cube_add()
     empty.context.object["tactile_object"] = record
