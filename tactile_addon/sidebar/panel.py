@@ -230,9 +230,9 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
             draw_sentence(context, layout, words, "ERROR")
         draw_rows(context, layout, map_rows(record, unit))
         _draw_colors(context, layout, obj, "tactile_map_colors")
-        medians = list(median_rows(record, unit))
-        if medians and (body := _folded(layout, "medians", "Medians of the Patches")):
-            draw_rows(context, body, medians)
+        if record["patches"]:
+            layout.label(text="Medians of the Patches")
+            draw_rows(context, layout, list(median_rows(record, unit)))
 
 
 class TACTILE_PT_probes(_Sidebar, bpy.types.Panel):

@@ -20,6 +20,7 @@ METERS = dict(zip((*ADAPTIVE["METRIC"], *ADAPTIVE["IMPERIAL"]), core.UNIT_METERS
 # In an adaptive unit lengths are at least 1 or this, because few count micrometers or thous.
 LEAST = {"MILLIMETERS": 1e-2, "INCHES": 1e-2}
 LEAST_SHOWN, SHOWN = 1e-4, 5e-2  # A length below the first is in a unit in which it is at least the second.
+SHARE = 0.1  # The unit suits this share of an object, which is about the radius of a patch.
 ZERO = 1e-6  # A number below this, in units of the radius or the size, counts as 0.
 SUPERSCRIPTS = {1: "", 2: "²"}
 
@@ -43,7 +44,8 @@ def unit_of(scene: bpy.types.Scene, size: float) -> Unit:
 
 def unit_of_report(scene: bpy.types.Scene, report: Mapping[str, Any]) -> Unit:
     """The unit of all numbers of a patch, a map or a whole object, which is one for all of one object."""
-    return unit_of(scene, report.get("object_size") or report.get("size") or report["radius"])
+    size = report.get("object_size") or report.get("size")
+    return unit_of(scene, SHARE * size if size else report["radius"])
 
 
 def say(value: float, power: int, unit: Unit, std: float | None = None) -> str:

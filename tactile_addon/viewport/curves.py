@@ -48,7 +48,7 @@ def draw_curves() -> None:
         with pushed:
             gpu.matrix.load_matrix(_nearer(context.region_data) @ gpu.matrix.get_model_view_matrix())
             gpu.matrix.multiply_matrix(obj.matrix_world @ lift)
-            draw(obj[CURVES], obj.tactile_contours, obj.tactile_directions)
+            draw(obj[CURVES], DARK, obj.tactile_contours, obj.tactile_directions)
     gpu.state.depth_test_set("NONE")
 
 
@@ -66,12 +66,12 @@ def _nearer(view: bpy.types.RegionView3D) -> Matrix:
     return Matrix.Translation((0.0, 0.0, (1.0 - NEARER) * view.view_distance))
 
 
-def draw(curves: Curves, has_contours: bool = True, has_directions: bool = False) -> None:
-    """Draws Curves in the coordinates of their patch."""
+def draw(curves: Curves, rim: tuple[float, ...], has_contours: bool, has_directions: bool) -> None:
+    """Draws Curves in the coordinates of their patch, with the rim in a color."""
     scale = bpy.context.preferences.system.ui_scale
     lines: list[tuple[Sequence[float], tuple[float, ...]]] = []
     if has_contours:
-        lines = [(path, WHITE) for path in curves["rim"]]
+        lines = [(path, rim) for path in curves["rim"]]
         pairs = zip(curves["contours"], cycle(PLANE_COLORS), strict=False)
         lines += [(path, (*color, 1.0)) for path, color in pairs]
     if has_directions:
@@ -138,5 +138,5 @@ def draw_preview(seen: dict[str, Any]) -> None:
     pushed = cast(Any, gpu.matrix.push_pop())
     with pushed:
         gpu.matrix.multiply_matrix(Matrix(frame.tolist()))
-        draw(curves_of(r))
+        draw(curves_of(r), WHITE, has_contours=True, has_directions=False)
         _draw_lines([(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.6 * r.radius]).tobytes(), WHITE)])

@@ -56,7 +56,7 @@ def start(**inputs):
     with bpy.context.temp_override(window=window, area=area, region=region):
         bpy.ops.tactile.stability_map("INVOKE_DEFAULT", True, **inputs)
     yield 1
-    gui.xdo("key", "Return")
+    gui.xdo("mousemove", 600, 300, "sleep", 0.3, "key", "Return")  # Not over a field of the dialog.
     yield from until(running, 5)
 
 
