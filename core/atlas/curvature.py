@@ -96,7 +96,8 @@ def curvatures_of(sheets: NormalSamples, points: Array, normals: Array) -> Curva
     near = np.minimum(2.0 * least, most)
     gauss, mean, _ = _fit_weingarten(distance, local, near)
     largest = np.abs(mean) + np.sqrt(np.maximum(mean**2 - gauss, 0.0))
-    radius = np.sqrt(2.0 * SAGITTA * std / np.maximum(largest, LEAST_DIVISOR)).clip(least, most)
+    largest = np.maximum(largest, LEAST_DIVISOR)
+    radius = np.sqrt(np.minimum(2.0 * SAGITTA * std, largest * most**2) / largest).clip(least, most)
     determined = (ends >= least) & ((distance < near[:, None]).sum(axis=1) >= FEWEST) & np.isfinite(std)
     gauss, mean, misfit = (
         np.where(determined, values, 0.0) for values in _fit_weingarten(distance, local, radius)

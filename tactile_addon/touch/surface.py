@@ -9,6 +9,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, size_of
 from .oriented import require_oriented
@@ -59,24 +60,19 @@ class MeshSurface(PlacedMesh):
         If these are more than `most`, there is only each second, third, ... of them.
         """
         # A sphere in the world is an ellipsoid in the object, which its longest axis bounds.
-        reach = radius * np.linalg.norm(self._inverse, ord=2)
+        reach = float(radius * np.linalg.norm(self._inverse, ord=2))
         at, few = self._to_local(point).astype(np.float32), len(self._co) // (MANY * (most or len(self._co)))
         for stride in dict.fromkeys((max(few, 1), 1)):  # All are looked at only if some are not enough.
-            near = stride * self._within(at, reach, stride)
-            if most is not None and len(near) >= most:
-                near = near[:: math.ceil(len(near) / most)]
+            co = self._co[::stride]
+            is_near = _are_within(reach, at, co)
+            count = np.count_nonzero(is_near)
+            if most is not None and count >= most:
                 break
-        for start in range(0, max(len(near), 1), VERTICES_AT_ONCE):
-            local = self._co[near[start : start + VERTICES_AT_ONCE]]
-            yield local @ self._linear.T + self._origin
-
-    def _within(self, at: Array, reach: float, stride: int) -> Array:
-        """Which (n,) of each `stride`th vertex are within `reach` of a place in the object, in parts."""
-        few, found = self._co[::stride], []
-        for start in range(0, len(few), VERTICES_AT_ONCE):
-            local = few[start : start + VERTICES_AT_ONCE] - at
-            found.append(start + np.flatnonzero(np.einsum("ij,ij->i", local, local) <= reach**2))
-        return np.concatenate(found)
+        every, seen = 1 if most is None else max(math.ceil(count / most), 1), 0
+        for part in _parts(co):
+            near = co[part][is_near[part]]
+            yield near[-seen % every :: every] @ self._linear.T + self._origin
+            seen += len(near)
 
     def project(self, location: Point) -> tuple[Triple, Triple, float]:
         """The (point, unit normal) of the mesh nearest to the world `location`, and the distance.
@@ -148,3 +144,17 @@ class MeshSurface(PlacedMesh):
         """The nearest (point, normal) in object coordinates."""
         found, point, normal, _ = self._object.closest_point_on_mesh(local, depsgraph=self._depsgraph)
         return (point, normal) if found else (None, None)
+
+
+def _parts(rows: Array) -> Iterator[slice]:
+    """The rows (n, 3) in parts, so that what is computed of each takes little memory."""
+    return (slice(start, start + VERTICES_AT_ONCE) for start in range(0, len(rows), VERTICES_AT_ONCE))
+
+
+def _are_within(reach: float, at: Array, co: Array) -> NDArray[np.bool_]:
+    """Which (n,) of the places (n, 3) are within `reach` of the place `at`."""
+    found = np.empty(len(co), dtype=bool)
+    for part in _parts(co):
+        local = co[part] - at
+        found[part] = np.einsum("ij,ij->i", local, local) <= reach**2
+    return found

@@ -65,6 +65,15 @@ def test_a_plane_is_flat_and_a_cylinder_bends_one_way():
     assert mean == pytest.approx(-1.0 / 6.0, rel=0.01)
 
 
+def test_a_plane_is_flat_in_any_unit():
+    mesh = grid(lambda x, y: 0.0 * x)
+    for scale in (1e-9, 1e9, 1e15):
+        large = core.Mesh(scale * mesh.vertices, mesh.triangles, scale * mesh.std, mesh.patch)
+        found = found_on(large)
+        assert scale * np.abs(found.mean).max() < 1e-12
+        assert np.isfinite(found.mean_std).any()
+
+
 def test_a_saddle_and_a_bowl_have_their_signs():
     gauss, mean, _ = tip_of(lambda x, y: 0.3 * (x**2 - y**2))
     assert gauss == pytest.approx(-0.36, rel=0.05)
