@@ -45,7 +45,7 @@ def _chart(name: str) -> dict[str, str | None]:
     return {f"charts/{name}.{end}": f"charts/{name}.{end}" for end in ("png", "csv")}
 
 
-# The caller names the folders $YCB and $PALPATION of public data; a run without its folder is left out.
+# The caller names the folders $YCB, $MODELS and $PALPATION of public data; a run without its folder is left out.
 RUNS = {
     "lesson": Run(
         "tools.lesson", "", dict.fromkeys(("lesson_one.jpg", "lesson_turn.jpg", "lesson_gauss.jpg"))
@@ -64,6 +64,7 @@ RUNS = {
         f"benchmarks.add_menu {ZIP}", "Blender's Add menu", {"add_menu.jpg": "charts/add_menu.jpg"}
     ),
     "touched": Run(f"benchmarks.add_menu {ZIP} --scans", "", {"touched.jpg": "charts/touched.jpg"}),
+    "models": Run(f"benchmarks.models {ZIP} $MODELS", "Standard models of the field, touched all over"),
     "measured": Run("benchmarks.measured --partial 200 --full 100", "Measured contacts all over objects"),
     "features": Run("benchmarks.measured --features", "Features of few contacts"),
     "orientation": Run("benchmarks.measured --orientation", "Sides of strokes without normals"),

@@ -60,18 +60,17 @@ def measure_slices():
 
     These are seconds of the thread's work, which other programs do not lengthen.
     """
-    operator = bpy.types.TACTILE_OT_touch_all_over
-    inner = operator.modal
+    for operator in (bpy.types.TACTILE_OT_touch_all_over, bpy.types.TACTILE_OT_continue_touching):
 
-    def modal(self, context, event):
-        begin = thread_time()
-        try:
-            return inner(self, context, event)
-        finally:
-            SLICES.append(thread_time() - begin)
-            WORDS.append(self._done()[0])
+        def modal(self, context, event, inner=operator.modal):
+            begin = thread_time()
+            try:
+                return inner(self, context, event)
+            finally:
+                SLICES.append(thread_time() - begin)
+                WORDS.append(self._done()[0])
 
-    operator.modal = modal
+        operator.modal = modal
 
 
 def make_target():
@@ -214,8 +213,8 @@ def continued(before):
     picture("whole_continue")
     gui.xdo("key", "Return")
     yield from until(running, 5)
-    yield 3
-    check("Continue: it is under way", running())
+    yield from until(lambda: WORDS[-1][0].isdigit() and int(WORDS[-1].split()[0]) > before["touches"], 60)
+    check("Continue: it is under way", running(), WORDS[-1])
     picture("whole_progress")
     bpy.ops.tactile.stop()
     yield from until(lambda: not running(), 120)
