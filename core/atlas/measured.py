@@ -35,8 +35,9 @@ FEWEST = 40  # The smallest patch has this many contacts.
 SOME_PLACES = 24  # The number of places at which it is tried how large a patch has to be.
 WIDENING, WIDENINGS = 1.4, 10  # Patches grow by this factor, at most this often.
 # Patches are at least the first share of their radius from each other, but for contacts that are farther out
-# than the second, up to which a patch reaches.
-PATCHES_APART, COVERED = 0.6, 1.0
+# than the third, up to which a patch reaches. Contacts within the second share of the least radius of one
+# without a patch carry none either: otherwise a patch bulges to a single contact that is off (test_measured).
+PATCHES_APART, MISSING, COVERED = 0.6, 0.6, 1.0
 RAY_PLACES = 24  # Where a patch ends is looked for at this many places on each ray.
 ABREAST = 8  # The number of neighbors of each contact that are to face the same way.
 SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
@@ -409,7 +410,7 @@ def _patches(cloud: _Cloud, radius: float) -> Generator[float, None, tuple[list[
         if r is None:  # At an edge there are no contacts on one side of it.
             middle = cloud.middle(i, radius)
             r, last = cloud.longest_sure(middle, radii, last)
-        left[i] = False
+        left[cloud.same_sheet(i, MISSING * radius) if r is None else i] = False
         if r is not None:
             found.append(r)
             tables.append(tabulate(r, cloud.rim(middle, r), deviations=True))
