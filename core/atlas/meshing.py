@@ -14,8 +14,7 @@ from ..triangles import normalized, row_dot, triangle_cross
 from .charts import Charts
 from .connectivity import Indices, connected_pieces, keyed_sides
 from .dual_contouring import PLACES_AT_ONCE, Surface, dual_contour
-from .field import INSIDE
-from .finger import FACING
+from .field import AGREE, INSIDE
 from .indicator import Indicator
 
 # python -m benchmarks.atlas judges these.
@@ -117,7 +116,7 @@ class MeasuredContacts(NamedTuple):
         from scipy.spatial import cKDTree
 
         away, at = cKDTree(self.points).query(points, NEAREST)
-        alike = np.einsum("kbi,ki->kb", self.normals[at], normals) > FACING
+        alike = np.einsum("kbi,ki->kb", self.normals[at], normals) > AGREE
         ways = normalized(self.points[self.links[at]] - points[:, None, None])
         between = np.linalg.norm(ways.mean(axis=2), axis=2) < ONE_SIDED
         is_felt = (alike & between & (away < BETWEEN * self.reach[at])).any(axis=1)
