@@ -38,9 +38,10 @@ def reachable(geometry: Geometry, surface: Surface, vertices: ArrayLike) -> NDAr
 
 def _reachable(geometry: Geometry, surface: Surface, points: Array) -> NDArray[np.intp]:
     """The `reachable` ones of some vertices (n, 3)."""
-    over = overlapped(geometry, points)
+    over, reach = overlapped(geometry, points), 2.0 * geometry.radius
     up = vector_of(geometry.frame.axes[:, 2])
-    visible = [_is_visible(surface, vector_of(point), up, 2.0 * geometry.radius) for point in points[over]]
+    starts, down = (points[over] + reach * geometry.frame.axes[:, 2]).tolist(), scaled(up, -1.0)
+    visible = [_meets_outside_at(surface, start, down, reach) for start in starts]
     over = over[np.array(visible, dtype=bool)]
     x, y, z = geometry.frame.to_local(points[over]).T
     heights = geometry.height(x, y)
@@ -171,17 +172,14 @@ def _foot(r: Reconstruction, surface: Surface, local: Vector, distance: float) -
     return point if dot(normal, up) > 0.0 else None
 
 
-def _is_visible(surface: Surface, point: Vector, up: Vector, reach: float) -> bool:
-    """Whether a ray from `reach` above along the unit `up` meets this vertex first, from its outside.
+def _meets_outside_at(surface: Surface, start: Vector, way: Vector, distance: float) -> bool:
+    """Whether a ray along the unit vector `way` meets the surface first at this distance, from its outside.
 
-    A ray to a vertex of an edge of the surface may miss it, but then nothing hides it.
+    A ray to a vertex of an edge of the surface may miss it, but then nothing is before it.
     """
-    hair = OWN_LAYER * reach
-    hit = surface.ray_cast(along(point, up, reach), scaled(up, -1.0), reach + hair)
-    if hit is None:
-        return True
-    met, normal = contact_of(hit, 1.0)
-    return dot(along(met, point, -1.0), up) <= hair and dot(normal, up) > 0.0
+    hair = OWN_LAYER * distance
+    hit = surface.ray_cast(start, way, distance + hair)
+    return hit is None or (math.dist(start, hit[0]) >= distance - hair and dot(vector_of(hit[1]), way) < 0.0)
 
 
 def is_hidden(surface: Surface, point: Vector, up: Vector, reach: float) -> bool:
