@@ -45,7 +45,8 @@ def _chart(name: str) -> dict[str, str | None]:
     return {f"charts/{name}.{end}": f"charts/{name}.{end}" for end in ("png", "csv")}
 
 
-# The caller names the folders $YCB, $MODELS and $PALPATION of public data; a run without its folder is left out.
+# The caller names the folders $YCB, $MODELS and $PALPATION of public data. A run without its folder is left
+# out.
 RUNS = {
     "lesson": Run(
         "tools.lesson", "", dict.fromkeys(("lesson_one.jpg", "lesson_turn.jpg", "lesson_gauss.jpg"))

@@ -24,6 +24,8 @@ from .lattice import Lattice, lattice_at_level, turned
 
 # python -m benchmarks.atlas --shapes judges these.
 BAND = 1.5  # Patches count within this many cells of the indicator, or pitches, of a point.
+# A sheet is about as near as another if it is less than this many pitches farther away. With 0.2 a cube along
+AS_NEAR = 0.35  # the axes has corners cut, with 0.5 an L has.
 CROSSED = 0.5  # A plane that passes an edge by this many pitches counts as well, if no other crosses it.
 SLACK = 1.0  # A vertex is at most this many pitches outside of its cell: the tip of a crease may be there.
 SOFT = 0.07  # A vertex does not move along planes that turn less, as mean squares of their sines: with .02 a
@@ -38,14 +40,16 @@ PLACES_AT_ONCE = 3000  # A step takes this many places.
 
 
 class Sides(NamedTuple):
-    """The sheets nearest to the points of a lattice (n,).
+    """Sheets near the points of a lattice (n,).
 
     points : (n,), in order
+    inside, outside : the nearest sheets; if these put them elsewhere, those about as near that put them there
     side : (n,), -1 or 1 if patches put them inside or outside, and no patch near denies it; otherwise 0
     """
 
     points: Indices
-    sheet: Blend
+    inside: Blend
+    outside: Blend
     side: Array
 
 
@@ -103,7 +107,7 @@ def _turned_at_creases(
     """
     lattice, edges = yield from lattice_at_level(indicator, pitch)
     layers, band = int(np.ceil(indicator.cell / pitch)) + 1, BAND * max(indicator.cell, pitch)
-    some = partial(_sides, charts, indicator.cell, band)
+    some = partial(_sides, charts, indicator.cell, pitch, band)
     points = np.unique(lattice.ends(edges))
     fields = yield from chunked(some, PLACES_AT_ONCE, 0.6, lattice.places(points))
     for _ in range(layers):
@@ -117,23 +121,26 @@ def _turned_at_creases(
         order = np.argsort(points, kind="stable")
         points = points[order]
         fields = tuple(np.concatenate(both)[order] for both in zip(fields, parts, strict=True))
-    return lattice, edges, Sides(points, Blend(*fields[:-1]), fields[-1])
+    half = len(Blend._fields)
+    return lattice, edges, Sides(points, Blend(*fields[:half]), Blend(*fields[half:-1]), fields[-1])
 
 
-def _sides(charts: Charts, cell: float, band: float, places: Array) -> tuple[Any, ...]:
-    """The fields of the Sides of places (n, 3), by the patches within a length of these.
+def _sides(charts: Charts, cell: float, pitch: float, band: float, places: Array) -> tuple[Any, ...]:
+    """The fields of the Sides of places (n, 3), by the patches within the length `band` of these.
 
     cell : only places that are nearer to a patch have a side
     """
     pairs, count = charts.pairs(places, band), len(places)
-    inside, outside = (
-        np.bincount(pairs.point_index[which], minlength=count) > 0
-        for which in (pairs.distance < 0.0, pairs.distance > 0.0)
-    )
-    away = np.full(count, np.inf)
-    np.minimum.at(away, pairs.point_index, distances_within_rims(charts, pairs))
-    side = np.where(away < cell, outside.astype(np.float64) - inside, 0.0)
-    return *nearest_sheet(charts, pairs, count), side
+    every, side, found = nearest_sheet(charts, pairs, count), np.zeros(count), []
+    distances, away = distances_within_rims(charts, pairs), np.full(count, np.inf)
+    np.minimum.at(away, pairs.point_index, distances)
+    is_near = distances <= away[pairs.point_index] + AS_NEAR * pitch
+    for way in (-1.0, 1.0):
+        is_there = np.sign(pairs.distance) == way
+        side += way * (np.bincount(pairs.point_index[is_there], minlength=count) > 0)
+        sheet = nearest_sheet(charts, pairs.chosen(is_there & is_near), count)
+        found += [*sheet.where((sheet.patch >= 0) & (every.distance * way <= 0.0), every)]
+    return *found, np.where(away < cell, side, 0.0)
 
 
 def _planes(lattice: Lattice, sides: Sides, edges: Indices) -> tuple[Array, Blend]:
@@ -145,8 +152,8 @@ def _planes(lattice: Lattice, sides: Sides, edges: Indices) -> tuple[Array, Blen
     one, other = lattice.ends(edges)
     is_inside = lattice.inside(one)
     inner, outer = np.where(is_inside, one, other), np.where(is_inside, other, one)
-    a = sides.sheet.at(np.searchsorted(sides.points, inner))
-    b = sides.sheet.at(np.searchsorted(sides.points, outer))
+    a = sides.inside.at(np.searchsorted(sides.points, inner))
+    b = sides.outside.at(np.searchsorted(sides.points, outer))
     origin = lattice.places(inner)
     way = lattice.places(outer) - origin
     from_a, missed_a = _crossing(a, a.distance, a.distance + row_dot(a.normal, way))

@@ -70,14 +70,15 @@ class Finger(NamedTuple):
         """The first contact of a finger that comes along a unit direction, or None."""
         return self._felt(self.surface.ray_cast(start, way, length), way)
 
-    def tapped(self, point: Vector, normal: Vector, length: float) -> Contact | None:
-        """The contact along a normal within a length of a point, of a finger that comes from above."""
-        return self.met(along(point, normal, length), scaled(normal, -1.0), 2.0 * length)
+    def near(
+        self, point: Vector, normal: Vector, length: float, cosine: float = SAME_SHEET_COSINE
+    ) -> Contact | None:
+        """The contact along a normal within a length of a point, if the surface there faces much alike.
 
-    def near(self, point: Vector, normal: Vector, length: float) -> Contact | None:
-        """The contact along a normal within a length of a point, if the surface there faces the same way."""
-        felt = self.tapped(point, normal, length)
-        return felt if felt is not None and dot(felt[1], normal) > SAME_SHEET_COSINE else None
+        cosine : of the largest angle between the normals
+        """
+        felt = self.met(along(point, normal, length), scaled(normal, -1.0), 2.0 * length)
+        return felt if felt is not None and dot(felt[1], normal) > cosine else None
 
     def _felt(self, hit: Hit | None, way: Vector) -> Contact | None:
         """The contact where a ray in this direction has hit, or None if it came from inside the object."""

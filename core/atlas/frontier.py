@@ -203,7 +203,7 @@ class Frontier:
             some = some[np.argsort(away, kind="stable")]
             some = some[np.unique(np.linspace(0, len(some) - 1, DISK_PLACES).astype(np.intp))]
             places = ((vector_of(mesh.vertices[i]), vector_of(normals[i])) for i in some)
-            contacts = [contact for p, n in places if (contact := self.finger.tapped(p, n, self.near))]
+            contacts = [contact for p, n in places if (contact := self.finger.near(p, n, self.near))]
             chosen: list[Contact] = []
             for contact in contacts if 2 * len(contacts) > len(some) else ():
                 if all(math.dist(contact[0], other[0]) > side for other in chosen):

@@ -340,7 +340,7 @@ class _Run:
         What the closed surface spans within the tolerance needs no touch.
         """
         places = [(vector_of(p), vector_of(n)) for p, n in zip(points, normals, strict=True)]
-        contacts = [self.frontier.finger.tapped(*place, self.tolerance) for place in places]
+        contacts = [self.frontier.finger.near(*place, self.tolerance, FACING) for place in places]
         return np.array([
             math.inf if contact is None else math.dist(place[0], contact[0])
             for place, contact in zip(places, contacts, strict=True)

@@ -63,7 +63,8 @@ class GrowingPatches:
             layer = min(LAYER * self._size, OWN_LAYER * float(np.median(rim)))
             above = _below(self._surface, points, normals) + self._height(r.frame, rim.max(), layer)
             self._patches.append((points + above[:, None] * normals, mean_curvature))
-            self._bends.append((max(abs(r.k1), abs(r.k2)), np.mean(rim**2)))
+            certain = max(abs(r.k1) - r.k1_std, abs(r.k2) - r.k2_std, 0.0)
+            self._bends.append((certain, np.mean(rim**2)))
         points, mean_curvatures = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
         count = 1 + SPOKES * len(RINGS)
         triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
@@ -94,7 +95,7 @@ class GrowingPatches:
 
 
 def _disk(r: core.Reconstruction, rim: Array) -> tuple[Array, Array, Array]:
-    """Points (n, 3) of a patch, on rings around its middle, normals, and mean curvatures (n,).
+    """Points (n, 3) of a patch, on rings around its middle, normals, and what is certain of mean curvatures.
 
     rim : (k SPOKES,), the radii of the patch all round, where the finger felt it end
     """
@@ -103,7 +104,9 @@ def _disk(r: core.Reconstruction, rim: Array) -> tuple[Array, Array, Array]:
     x, y = np.vstack([np.zeros((1, 2)), *(share * edge for share in RINGS)]).T
     d = r.geometry.derivatives(x, y)
     points = r.frame.to_world(np.column_stack([x, y, d.z]))
-    return points, d.normal @ r.frame.axes.T, r.patch.mean_curvature(x, y)
+    mean_curvature = r.patch.mean_curvature(x, y)
+    certain = np.maximum(np.abs(mean_curvature) - 0.5 * (r.k1_std + r.k2_std), 0.0)
+    return points, d.normal @ r.frame.axes.T, np.copysign(certain, mean_curvature)
 
 
 def _below(surface: DetachedMesh, points: Array, normals: Array) -> Array:

@@ -182,8 +182,8 @@ def sides():
     for gap in (0.5, 0.05):
         strokes = [*sphere(1.0, gap), *sphere(0.8, gap)]
         points = np.vstack(strokes)
-        planes = planes_of(points, 0.0)
-        found.append(list(doubts_of(points, oriented(strokes, planes), planes)))
+        planes, stroke = planes_of(points, 0.0), np.repeat(np.arange(len(strokes)), list(map(len, strokes)))
+        found.append(list(doubts_of(points, oriented(points, planes, stroke), planes)))
     return found
 
 
@@ -209,6 +209,15 @@ def off_surface():
     points = (1.0 + 0.05 * near * np.random.default_rng(0).normal(size=600))[:, None] * ball()
     given = [core.Contour(points, normals=ball())]
     return [core.atlas_of(given, noise=std).doubts for std in (1e-3, 0.05)]
+
+
+def confused():
+    """Two balls with a gap, felt by strokes that are farther apart than it, and nearer."""
+    found = []
+    for gap in (0.2, 0.1):
+        one = [0.5 * ring for ring in rings_of_ball(gap=gap)]
+        found.append(core.atlas_of([*one, *(ring + np.array([1.02, 0.0, 0.0]) for ring in one)]).doubts)
+    return found
 
 
 def unfelt():
@@ -238,10 +247,11 @@ OF_TOUCHES = {
 }
 OF_OBJECTS = {
     each.__name__.rstrip("_"): each
-    for each in (opposed, ball_, noise, cavity, off_surface, unfelt, cut_short_, rough)
+    for each in (opposed, ball_, noise, cavity, off_surface, confused, unfelt, cut_short_, rough)
 }
 # What only Blender knows is in tests/addon; goes_on, thin and rays take objects for minutes.
-ELSEWHERE = {"at_edge", "stopped", "holes", "open_edges", "off_mesh", "share", "mean_height"}
+ELSEWHERE = {"at_edge", "stopped", "out_of_reach", "holes", "off_mesh", "share", "mean_height"}
+ELSEWHERE |= {"open_edges", "narrow", "hidden", "single_facets"}
 
 
 def assert_helped(code, before, after):

@@ -18,7 +18,7 @@ def why(extension, empty):
         )
         why_far = extension.tactile_addon.whole_object.farthest_place.why_far
         found = why_far(surface, np.subtract(place, surface.origin), off, patch, ("m", 1.0))
-        return found and found[1].removeprefix(f"The surface is up to {off:g} m off the object ")
+        return found and str(found).removeprefix(f"The surface is up to {off:g} m off the object ")
 
     return why
 
@@ -34,7 +34,7 @@ def without(bpy, obj, where):
 
 def test_a_hole_is_named_only_beside_it(empty, ball, why):
     without(empty, ball, lambda center: center.z > 1.95)
-    beside = "beside an open edge of its mesh, as around a hole: close it, or use a smaller tolerance."
+    beside = "beside an open edge of its mesh, as around a hole: close it or use a smaller tolerance."
     assert why((0.6, 0.0, 1.9), 0.3) == beside
     assert why((0.0, 0.0, -2.0), 0.3) is None
 
@@ -46,7 +46,7 @@ def test_a_narrow_gap_is_named_with_its_width(empty, why, place):
     for obj in empty.data.objects:
         obj.select_set(True)
     empty.ops.object.join()
-    gap = "where a wall or gap is 0.01 m wide: touch such parts as objects of their own, or fill the gap."
+    gap = "where a wall or gap is 0.01 m wide: touch such parts as objects of their own or fill the gap."
     assert why(place, 0.3) == gap
     assert why((0.0, 0.5, 0.1), 0.3) is None
 
@@ -56,7 +56,7 @@ def test_a_pocket_is_named_where_few_directions_lead_outside(empty, ball, why):
     without(empty, ball, lambda center: center.z > 1.98)
     ball.modifiers.new("Solidify", "SOLIDIFY").thickness = 0.2
     empty.context.view_layer.update()
-    hidden = "where its own parts nearly hide it: delete what is inside, or touch it as an object of its own."
+    hidden = "where its own parts nearly hide it: delete what is inside or touch it as an object of its own."
     assert why((0.0, 0.0, -1.8), 0.1) == hidden
 
 
@@ -69,6 +69,6 @@ def test_facets_are_named_where_touches_follow_them(empty, extension, why):
     )
     point, normal = found.nearest_point(surface, place, 1.0)
     patch = extension.core.explore(surface, point, normal, farthest=0.5).result
-    follow = "where touches follow single facets: add a Subdivision modifier, or use a smaller tolerance."
+    follow = "where touches follow single facets: add a Subdivision modifier or use a smaller tolerance."
     assert why(place, 0.1, patch) == follow
     assert why(place, 0.1) is None

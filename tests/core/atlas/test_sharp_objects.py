@@ -119,6 +119,12 @@ def test_edges_are_straight_to_half_a_tolerance(block):
             assert np.percentile(off, 95) < 0.5 * TOLERANCE
 
 
+def test_a_cube_along_the_axes_takes_few_touches():
+    """Points of the lattice lie in the planes of its faces, where these have no inside and no outside."""
+    atlas = explored(solids.block(1.0, 1.0, 1.0), tolerance=2e-3, noise=0.0)
+    assert (atlas.status, len(atlas.patches) < 14) == ("ok", True)
+
+
 @pytest.mark.parametrize("seed", [1, 9, 13])
 def test_no_triangle_bridges_a_concave_edge_or_cuts_a_corner(seed):
     bracket = solids.bracket(Rotation.random(random_state=seed).as_matrix())
