@@ -14,7 +14,7 @@ import pytest
 import core
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = ("README.md", "docs/contact_data.md", "docs/scripting.md", "docs/whole_objects.md")
+PAGES = ("README.md", "docs/contacts.md", "docs/scripting.md", "docs/whole_objects.md")
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
 

@@ -25,7 +25,7 @@ from .lattice import Lattice, lattice_at_level, turned
 # python -m benchmarks.atlas --shapes judges these.
 BAND = 1.5  # Patches count within this many cells of the indicator, or pitches, of a point.
 # A sheet is about as near as another if it is less than this many pitches farther away. With 0.2 a cube along
-AS_NEAR = 0.35  # the axes has corners cut, with 0.5 an L has.
+AS_NEAR = 0.5  # the axes has corners cut, with any an L.
 CROSSED = 0.5  # A plane that passes an edge by this many pitches counts as well, if no other crosses it.
 SLACK = 1.0  # A vertex is at most this many pitches outside of its cell: the tip of a crease may be there.
 SOFT = 0.07  # A vertex does not move along planes that turn less, as mean squares of their sines: with .02 a

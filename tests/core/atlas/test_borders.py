@@ -88,7 +88,7 @@ def test_an_open_sheet_is_a_disc_that_ends_at_the_border_with_its_corners(polygo
     up = np.array([math.sin(0.2), 0.0, math.cos(0.2)]) if is_bent else np.array([0.0, 0.0, 1.0])
     atlas, border = explored(sheet, (0.2, 0.15), up), sheet.points(outline(polygon))
     assert atlas.status == "ok"
-    for mesh in (atlas.reference.mesh, atlas.mesh(0.01), atlas.mesh(0.04)):
+    for mesh in (atlas.reference.mesh, atlas.mesh(0.012), atlas.mesh(0.04)):
         shape = solids.topology(mesh.triangles)
         assert (shape.tangled, shape.euler, shape.pieces) == (0, 1, 1)
         # A bent border is between the vertices off its chords.

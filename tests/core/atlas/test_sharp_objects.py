@@ -125,7 +125,7 @@ def test_a_cube_along_the_axes_takes_few_touches():
     assert (atlas.status, len(atlas.patches) < 14) == ("ok", True)
 
 
-@pytest.mark.parametrize("seed", [1, 9, 13])
+@pytest.mark.parametrize("seed", [1, 6, 9])
 def test_no_triangle_bridges_a_concave_edge_or_cuts_a_corner(seed):
     bracket = solids.bracket(Rotation.random(random_state=seed).as_matrix())
     atlas = explored(bracket, tolerance=2e-3, noise=0.0)
