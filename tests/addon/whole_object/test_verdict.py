@@ -51,16 +51,14 @@ def test_a_cube_is_a_cube_with_sharp_edges(empty, extension):
     assert (record["status"], record["message"], record["is_closed"]) == ("ok", OK, True)
     assert record["deviation_max"] < 1e-5
     report = extension.tactile_addon.whole_object.object_report
-    agreement = "All of the surface is within the tolerance of 0.4 cm, and the farthest place is 0 cm off."
-    rule = "Good means at least 99 % within it, and none farther off than 1.2 cm."
+    agreement = "All of the surface is within the tolerance of 0.004 m, and the farthest place is 0 m off."
+    rule = "Good means at least 99 % within it, and none farther off than 0.012 m."
     assert report.object_verdict(record) == f"Good. {OK} {agreement} {rule}"
     assert report.is_all_within(record)
-    assert dict(report.object_rows(record))["Deviation"] == "0 cm"
+    assert dict(report.object_rows(record))["Deviation"] == "0 m"
     # What is farther off than that is in the message already.
     far = {**record, "deviation_max": 0.05, "within": 0.9}
-    words = (
-        f"90 % of the surface is within the tolerance of 0.4 cm, and the farthest place is 5 cm off. {rule}"
-    )
+    words = f"90 % of the surface is within the tolerance of 0.004 m, and the farthest place is 0.05 m off. {rule}"
     assert report.agreement(far) == words
     mesh = surface.data
     ends = np.array([edge.vertices for edge in mesh.edges])[values(mesh, "sharp_edge").astype(bool)]
