@@ -58,8 +58,8 @@ def test_a_cube_is_a_cube_with_sharp_edges(empty, extension):
     assert dict(report.object_rows(record))["Deviation"] == "0 m"
     # What is farther off than that is in the message already.
     far = {**record, "deviation_max": 0.05, "within": 0.9}
-    words = f"90 % of the surface is within the tolerance of 0.004 m, and the farthest place is 0.05 m off. {rule}"
-    assert report.agreement(far) == words
+    words = "90 % of the surface is within the tolerance of 0.004 m, and the farthest place is 0.05 m off."
+    assert report.agreement(far) == f"{words} {rule}"
     mesh = surface.data
     ends = np.array([edge.vertices for edge in mesh.edges])[values(mesh, "sharp_edge").astype(bool)]
     at_faces = np.isclose(np.abs(positions(mesh)), 1.0, atol=1e-5).sum(axis=1)
