@@ -26,7 +26,7 @@ def without_normals(path):
 
 
 def in_several_files(path):
-    """The same curves and strokes, each again in a file of its own."""
+    """Writes each curve and stroke once more, into a file of its own."""
     found = core.contacts_from_csv(path.read_text())
     for k, curve in enumerate((*found.contours, *found.strokes)):
         alone = found._replace(contours=[], strokes=(curve,))
