@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/messages.md has every doubt and message that the sources have, no other, and each is in a test."""
+"""docs/messages.md has every doubt, and only messages that the sources have; each of these is in a test."""
 
 import ast
 import re
@@ -73,17 +73,13 @@ def is_about_an_argument(text):
 
 
 @pytest.mark.parametrize("message", [m for m in MESSAGES if not is_about_an_argument(m)])
-def test_every_message_is_in_the_table(message):
-    assert message in ROWS
+def test_every_message_is_in_a_test(message):
+    assert_in_a_test([re.findall(r"\w+", part) for part in message.split("…")])
 
 
 @pytest.mark.parametrize("row", ROWS)
-def test_every_row_is_a_message_and_in_a_test(row):
-    fixed = [re.findall(r"\w+", part) for part in row.split("…")]
-    if row.startswith(("…: expected", "The patch describes")):
-        return
-    assert row in MESSAGES
-    assert_in_a_test(fixed)
+def test_every_row_is_a_message(row):
+    assert row in MESSAGES or row.startswith(("…: expected", "The patch describes"))
 
 
 def assert_in_a_test(fixed):
