@@ -159,7 +159,7 @@ def test_sides_in_parts_are_looked_at_as_all_together(monkeypatch, parts, found)
 
 
 def test_a_look_at_many_faces_takes_little_memory(monkeypatch):
-    """Ten million faces took 9 GB, three times what Blender needs to touch them."""
+    """Ten million faces took 12 GB, three times what Blender needs to touch them."""
     monkeypatch.setattr(face_orientation, "SIDES_AT_ONCE", 10_000)
     x, y = np.meshgrid(*[np.linspace(-1.0, 1.0, 301, dtype=np.float32)] * 2)
     points = np.column_stack([x.ravel(), y.ravel(), (9.0 - x**2 - y**2).ravel()])
