@@ -75,7 +75,7 @@ def _sides_of(points: Array, corners: Indices, starts: Indices) -> _Sides:
     end[starts + lengths - 1] = start[starts]
     face, proper = np.repeat(np.arange(len(starts), dtype=np.int32), lengths), start != end
     start, end, face = start[proper], end[proper], face[proper]
-    edge = np.minimum(start, end) * np.int64(len(points)) + np.maximum(start, end)
+    edge = np.minimum(start, end).astype(np.int64) * len(points) + np.maximum(start, end)
     order = np.argsort(edge, kind="stable").astype(np.int32)
     edge = edge[order]
     begin = np.flatnonzero(np.append(True, edge[1:] != edge[:-1]))

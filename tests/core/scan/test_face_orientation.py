@@ -158,6 +158,14 @@ def test_sides_in_parts_are_looked_at_as_all_together(monkeypatch, parts, found)
         assert fault(*parts) == found
 
 
+def test_edges_of_a_million_vertices_are_told_apart():
+    """In 32 bits, 4096 times the number of vertices is 0."""
+    points = np.random.default_rng(0).uniform(size=(2**20, 3))
+    corners = np.array([0, 5000, 5001, 4096, 5001, 5000], dtype=np.int32)
+    sides = face_orientation._sides_of(points, corners, np.array([0, 3], dtype=np.int32))
+    assert (len(sides.rims), len(sides.pairs)) == (4, 1)
+
+
 def test_a_look_at_many_faces_takes_little_memory(monkeypatch):
     """Ten million faces took 12 GB, three times what Blender needs to touch them."""
     monkeypatch.setattr(face_orientation, "SIDES_AT_ONCE", 10_000)
