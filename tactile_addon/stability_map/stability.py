@@ -111,15 +111,15 @@ class StabilityMap:
         self._glance: dict[str, Any] = {"extent": usual, "step": step or usual / LEAST_STEPS}
         require_lengths(obj.name, self.surface.size, **self._glance, noise=noise)
         self.spacing = spacing or SPACING_SHARE * usual
+        require_fine(self.surface.spacing, self._glance["step"])
+        self.planes, self.noise, self.seed, self.fit = planes, noise, seed, fit
+        self._rng = np.random.default_rng(seed)
+        _rehearse(planes, fit, **self._glance)
         if expected_count(obj, depsgraph, extent, self.spacing) > MOST_TOUCHES:
             raise ValueError(
                 f'The spacing {length(self.spacing)} takes over {MOST_TOUCHES:,} touches of "{obj.name}": '
                 "use a larger one"
             )
-        require_fine(self.surface.spacing, self._glance["step"])
-        self.planes, self.noise, self.seed, self.fit = planes, noise, seed, fit
-        self._rng = np.random.default_rng(seed)
-        _rehearse(planes, fit, **self._glance)
         self.places: list[Array] = []
         self.done = self.few_facets = 0
 
