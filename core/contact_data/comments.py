@@ -26,8 +26,8 @@ UNIT_METERS = {
 NO_UNIT = "no unit"
 VECTOR_KEYS, CURVE_KEYS = ("point", "outward"), ("noise", "normal_std", "ball")
 KEYS = (*VECTOR_KEYS, *CURVE_KEYS)
-# A spreadsheet may have put separators into comments, and at their ends.
-COMMENT = re.compile(r"\n[ \t]*(?:#|//)[#/ \t,;|]*([^\n]*)")
+# A spreadsheet may have put separators into comments, and at their ends, and quotes around words.
+COMMENT = re.compile(r"\n[ \t\"]*(?:#|//)[^\w\n]*([^\n]*)")
 VERSION_AND_UNIT = re.compile(
     TITLE + r"\W*version\s*([^\s,;|]*)(?:\W*lengths in ([^,;|\t]*))?", re.IGNORECASE
 )
@@ -43,7 +43,7 @@ def comments(text: str) -> Iterator[tuple[int, str, int]]:
     for found in COMMENT.finditer("\n" + text):
         number += text.count("\n", place, found.start())
         place = found.start()
-        yield number, found[1], found.end()
+        yield number, found[1].replace('"', " "), found.end()
 
 
 def stated(name: str, text: str) -> tuple[str, dict[str, Any]]:

@@ -75,7 +75,7 @@ def header_of(text: str) -> tuple[str, int, int] | None:
 
 def is_row(line: str) -> bool:
     """Whether a line has fields, and is neither blank nor a comment."""
-    words = line.lstrip()
+    words = line.strip().lstrip('"')
     return bool(words) and not words.startswith(COMMENT_MARKS)
 
 

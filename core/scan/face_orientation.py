@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether the faces of a mesh point outward and lie on no others, and where the mesh is open."""
 
-from typing import NamedTuple
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..arguments import Array
 from ..triangles import row_dot, triangle_cross
 
-Indices = NDArray[np.intp]
+Indices = NDArray[np.integer[Any]]
 
 DOUBLED, INWARD = "doubled", "inward"
 # A mesh is doubled if more of its faces are than this share: where vertices of the pear of docs/scans.md
@@ -19,18 +20,20 @@ DOUBLED_SHARE = 0.01
 SHELLS = 8  # At most so many shells, those of the largest negative volumes, are looked at.
 INSIDE_OUT = -0.75  # The winding number before a face: 0 of a solid, -1/2 of a sheet, -1 if inside out.
 
+SIDES_AT_ONCE = 500_000  # A look at ten million faces takes 2 GB, and took 12 with all sides at once.
+
 
 class _Sides(NamedTuple):
     """The sides (k,) of all faces: the vertices where they start and end, and their faces.
 
-    shared : (k,), the number of sides along the same edge
+    rims : (r,), the sides that have their edge alone
     pairs : (p, 2), the two sides along each edge that has two
     """
 
     start: Indices
     end: Indices
     face: Indices
-    shared: Indices
+    rims: Indices
     pairs: Indices
 
 
@@ -45,7 +48,6 @@ def orientation_fault(points: Array, corners: Indices, starts: Indices) -> str:
     along their edge in the same direction, or if a shell is inside out: it has a negative volume, and it is
     no cavity, because no other shell is around it. A flat sheet has no inside.
     """
-    points, corners, starts = np.asarray(points, float), np.asarray(corners, int), np.asarray(starts, int)
     sides = _sides_of(points, corners, starts)
     if _doubled(sides, len(starts)) > DOUBLED_SHARE * len(starts):
         return DOUBLED
@@ -60,30 +62,41 @@ def open_edge_distance(points: Array, corners: Indices, starts: Indices, place: 
 
     points, corners, starts : as in `orientation_fault`
     """
-    points, corners, starts = np.asarray(points, float), np.asarray(corners, int), np.asarray(starts, int)
     sides = _sides_of(points, corners, starts)
-    start, end = points[sides.start[sides.shared == 1]], points[sides.end[sides.shared == 1]]
+    start, end = points[sides.start[sides.rims]], points[sides.end[sides.rims]]
     along, away = end - start, np.asarray(place, dtype=float) - start
     shares = np.clip(row_dot(away, along) / row_dot(along, along), 0.0, 1.0)
     return float(np.linalg.norm(away - shares[:, None] * along, axis=1).min(initial=np.inf))
 
 
 def _sides_of(points: Array, corners: Indices, starts: Indices) -> _Sides:
-    places = np.ascontiguousarray(points + 0.0)  # -0 + 0 is 0.
-    _, first, same = np.unique(places.view(f"V{places.strides[0]}"), return_index=True, return_inverse=True)
-    following, lengths = np.arange(1, len(corners) + 1), np.diff(starts, append=len(corners))
-    following[starts + lengths - 1] = starts
-    start, face = first[same.ravel()][corners], np.repeat(np.arange(len(starts)), lengths)
-    proper = start != start[following]
-    start, end, face = start[proper], start[following][proper], face[proper]
-    edge = np.minimum(start, end) * len(points) + np.maximum(start, end)
-    order = np.argsort(edge, kind="stable")
-    begin = np.flatnonzero(np.diff(edge[order], prepend=-1))
+    start = _first_in_place(points)[corners]
+    lengths, end = np.diff(starts, append=len(corners)), np.roll(start, -1)
+    end[starts + lengths - 1] = start[starts]
+    face, proper = np.repeat(np.arange(len(starts), dtype=np.int32), lengths), start != end
+    start, end, face = start[proper], end[proper], face[proper]
+    edge = np.minimum(start, end).astype(np.int64) * len(points) + np.maximum(start, end)
+    order = np.argsort(edge, kind="stable").astype(np.int32)
+    edge = edge[order]
+    begin = np.flatnonzero(np.append(True, edge[1:] != edge[:-1]))
     count = np.diff(begin, append=len(order))
-    shared = np.empty_like(order)
-    shared[order] = np.repeat(count, count)
     two = begin[count == 2]
-    return _Sides(start, end, face, shared, np.column_stack([order[two], order[two + 1]]))
+    return _Sides(start, end, face, order[begin[count == 1]], np.column_stack([order[two], order[two + 1]]))
+
+
+def _first_in_place(points: Array) -> Indices:
+    """The first vertex (n,) that is in the place of each."""
+    order = np.lexsort(points.T)
+    placed = points[order]
+    is_new = np.append(True, (placed[1:] != placed[:-1]).any(axis=1))
+    first = np.empty(len(points), dtype=np.int32)
+    first[order] = order[is_new][np.cumsum(is_new) - 1]
+    return first
+
+
+def _parts(rows: Array | Indices) -> Iterator[slice]:
+    """The rows in parts, so that what is computed of each takes little memory."""
+    return (slice(start, start + SIDES_AT_ONCE) for start in range(0, len(rows), SIDES_AT_ONCE))
 
 
 def _doubled(sides: _Sides, count: int) -> int:
@@ -94,8 +107,10 @@ def _doubled(sides: _Sides, count: int) -> int:
     most = int(sides.start.max()) + 1
     one, other = np.random.default_rng(0).integers(2**63, size=(2, most), dtype=np.uint64)
     along, against = np.zeros((2, count), dtype=np.uint64)
-    np.add.at(along, sides.face, one[sides.start] * other[sides.end])
-    np.add.at(against, sides.face, one[sides.end] * other[sides.start])
+    for part in _parts(sides.face):
+        start, end, face = sides.start[part], sides.end[part], sides.face[part]
+        np.add.at(along, face, one[start] * other[end])
+        np.add.at(against, face, one[end] * other[start])
     has_area = np.bincount(sides.face, minlength=count) > 2
     return int(np.isin(along[has_area], against[has_area]).sum())
 
@@ -107,37 +122,39 @@ def _is_inside_out(points: Array, sides: _Sides, hubs: Indices) -> bool:
 
     i, j = sides.face[sides.pairs.T]
     shells, shell = connected_components(coo_matrix((np.ones(len(i)), (i, j)), (len(hubs),) * 2), False)
-    shell = shell[sides.face]
-    at = points - points.mean(axis=0)
-    fans = at[np.column_stack([hubs[sides.face], sides.start, sides.end])]
-    across = triangle_cross(fans)
-
-    def sums(values: Array, of: Indices) -> Array:
-        """The sums (shells, 3) of vectors (k, 3) by the shell that each is of, (k,)."""
-        return np.column_stack([np.bincount(of, column, shells) for column in values.T])
-
+    shell, at = shell[sides.face], points - points.mean(axis=0, dtype=float)
+    fans = np.column_stack([hubs[sides.face], sides.start, sides.end])
+    volumes, areas, squares = np.zeros(shells), np.zeros((shells, 3)), np.empty(len(fans))
+    for part in _parts(fans):
+        triangles = at[fans[part]]
+        across = triangle_cross(triangles)
+        squares[part] = row_dot(across, across)
+        np.add.at(volumes, shell[part], row_dot(triangles[:, 0], across))
+        np.add.at(areas, shell[part], across)
     # A fan around the middle of its rims closes an open shell.
-    is_rim = sides.shared == 1
-    rims = np.maximum(np.bincount(shell[is_rim], minlength=shells), 1)[:, None]
-    middles = sums(at[sides.start[is_rim]], shell[is_rim]) / rims
-    volumes = np.bincount(shell, row_dot(fans[:, 0], across), shells) - row_dot(middles, sums(across, shell))
+    rims, middles = shell[sides.rims], np.zeros((shells, 3))
+    np.add.at(middles, rims, at[sides.start[sides.rims]])
+    middles /= np.maximum(np.bincount(rims, minlength=shells), 1)[:, None]
+    volumes -= row_dot(middles, areas)
     for number in np.argsort(volumes)[:SHELLS]:
         if volumes[number] >= 0.0:
             break
         own = np.flatnonzero(shell == number)
-        if _winding_before(fans, own[np.argmax(row_dot(across[own], across[own]))]) < INSIDE_OUT:
+        if _winding_before(at, fans, own[np.argmax(squares[own])]) < INSIDE_OUT:
             return True
     return False
 
 
-def _winding_before(triangles: Array, number: int) -> float:
-    """The winding number of triangles (m, 3, 3) just before the middle of one of them.
+def _winding_before(points: Array, triangles: Indices, number: int) -> float:
+    """The winding number of triangles (m, 3) of points just before the middle of one of them.
 
     It is the sum of their solid angles (Van Oosterom & Strackee 1983), and that one's own is half of all.
     """
-    others = np.delete(triangles, number, axis=0) - triangles[number].mean(axis=0)
-    a, b, c = np.moveaxis(others, 1, 0)
-    u, v, w = (np.linalg.norm(corner, axis=1) for corner in (a, b, c))
-    below = u * v * w + row_dot(a, b) * w + row_dot(b, c) * u + row_dot(c, a) * v
-    half_angles = np.arctan2(row_dot(a, np.cross(b, c)), below)
-    return float(half_angles.sum() / (2.0 * np.pi)) - 0.5
+    middle, total = points[triangles[number]].mean(axis=0), 0.0
+    others = np.delete(triangles, number, axis=0)
+    for part in _parts(others):
+        a, b, c = np.moveaxis(points[others[part]] - middle, 1, 0)
+        u, v, w = (np.linalg.norm(corner, axis=1) for corner in (a, b, c))
+        below = u * v * w + row_dot(a, b) * w + row_dot(b, c) * u + row_dot(c, a) * v
+        total += float(np.arctan2(row_dot(a, np.cross(b, c)), below).sum())
+    return total / (2.0 * np.pi) - 0.5

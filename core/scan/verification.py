@@ -28,7 +28,8 @@ OWN_LAYER = 1e-3  # A layer within this share of the reach is the vertex's own.
 def reachable(geometry: Geometry, surface: Surface, vertices: ArrayLike) -> NDArray[np.intp]:
     """The indices (m,) of the overlapped world vertices (n, 3) that a finger on the patch could meet.
 
-    From above they are the first of `surface`, with its outside up; no other layer is nearer to the patch.
+    Nothing of `surface` hides them from above. Those off the patch have their outside up, and no other layer
+    is nearer to it.
     """
     points = np.asarray(vertices)
     starts = range(0, len(points), POINTS_AT_ONCE)
@@ -40,16 +41,16 @@ def _reachable(geometry: Geometry, surface: Surface, points: Array) -> NDArray[n
     """The `reachable` ones of some vertices (n, 3)."""
     over, reach = overlapped(geometry, points), 2.0 * geometry.radius
     up = vector_of(geometry.frame.axes[:, 2])
-    starts, down = (points[over] + reach * geometry.frame.axes[:, 2]).tolist(), scaled(up, -1.0)
-    visible = [_meets_outside_at(surface, start, down, reach) for start in starts]
-    over = over[np.array(visible, dtype=bool)]
+    is_seen = [not is_hidden(surface, point, up, reach) for point in points[over].tolist()]
+    over = over[np.array(is_seen, dtype=bool)]
     x, y, z = geometry.frame.to_local(points[over]).T
     heights = geometry.height(x, y)
-    feet, offs = geometry.frame.to_world(np.column_stack([x, y, heights])).tolist(), np.abs(z - heights)
-    hair = 2.0 * OWN_LAYER * geometry.radius
+    feet = geometry.frame.to_world(np.column_stack([x, y, heights])).tolist()
+    hair = OWN_LAYER * reach
     own = [
-        off <= hair or layer_height(surface, vector_of(foot), up, off - hair) is None
-        for foot, off in zip(feet, offs.tolist(), strict=True)
+        off <= hair
+        or (_faces_up(surface, point, up, hair) and layer_height(surface, foot, up, off - hair) is None)
+        for point, foot, off in zip(points[over].tolist(), feet, np.abs(z - heights).tolist(), strict=True)
     ]
     return over[np.array(own, dtype=bool)]
 
@@ -172,14 +173,13 @@ def _foot(r: Reconstruction, surface: Surface, local: Vector, distance: float) -
     return point if dot(normal, up) > 0.0 else None
 
 
-def _meets_outside_at(surface: Surface, start: Vector, way: Vector, distance: float) -> bool:
-    """Whether a ray along the unit vector `way` meets the surface first at this distance, from its outside.
+def _faces_up(surface: Surface, point: Vector, up: Vector, hair: float) -> bool:
+    """Whether the outside of the surface is up at a point of it, as a ray from `hair` above it feels.
 
-    A ray to a vertex of an edge of the surface may miss it, but then nothing is before it.
+    A ray to a vertex of an edge of the surface may miss it, and it counts then.
     """
-    hair = OWN_LAYER * distance
-    hit = surface.ray_cast(start, way, distance + hair)
-    return hit is None or (math.dist(start, hit[0]) >= distance - hair and dot(vector_of(hit[1]), way) < 0.0)
+    hit = surface.ray_cast(along(point, up, hair), scaled(up, -1.0), 2.0 * hair)
+    return hit is None or dot(vector_of(hit[1]), up) > 0.0
 
 
 def is_hidden(surface: Surface, point: Vector, up: Vector, reach: float) -> bool:

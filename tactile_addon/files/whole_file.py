@@ -32,6 +32,8 @@ def replacing(path: str | Path) -> Iterator[Path]:
     _sweep(target.parent, stem, ending)
     temporary = target.with_name(f"{stem}{secrets.token_hex(4)}{ending}")
     try:
+        temporary.touch()  # Blender's exporters do not tell why they cannot,
+        temporary.unlink()  # and keep a file that is there.
         yield temporary
         with temporary.open("rb+") as file:
             os.fsync(file.fileno())

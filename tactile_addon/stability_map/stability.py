@@ -23,6 +23,7 @@ from ..touch.units import length
 
 EXTENT_SHARE = 1.0 / 8.0  # This share of the object's size stands for an extent that touches choose.
 SPACING_SHARE = 1.0 / 2.0  # The default spacing, as a share of the extent.
+MOST_TOUCHES = 1_000_000  # They take hours, and the places among which they are chosen 2 GB.
 TRIED_SPACING = 1.0 / 4.0  # Touches that are timed are so far apart, as a share of the object's size.
 BATCH = 20  # The number of touches that are fitted at once, in some hundredths of a second.
 GROWING_BATCH = 4  # Touches that choose their extent are fewer, because their fits have more contacts.
@@ -114,6 +115,11 @@ class StabilityMap:
         self.planes, self.noise, self.seed, self.fit = planes, noise, seed, fit
         self._rng = np.random.default_rng(seed)
         _rehearse(planes, fit, **self._glance)
+        if expected_count(obj, depsgraph, extent, self.spacing) > MOST_TOUCHES:
+            raise ValueError(
+                f'The spacing {length(self.spacing)} takes over {MOST_TOUCHES:,} touches of "{obj.name}": '
+                "use a larger one"
+            )
         self.places: list[Array] = []
         self.done = self.few_facets = 0
 

@@ -56,9 +56,11 @@ def test_on_a_full_disk_the_old_file_stays_and_the_error_names_it(command, files
     assert old is None or out.read_text() == old
 
 
-def test_a_folder_in_which_nobody_may_write_is_no_question_of_room(whole_file):
-    with pytest.raises(OSError, match="get the right to write there, or choose another place"):
-        whole_file.write_text("/sys/out.json", "{}")
+@pytest.mark.parametrize(("option", "kind"), WRITERS)
+def test_a_folder_in_which_nobody_may_write_is_no_question_of_room(command, files, option, kind):
+    code, _, err = command("reconstruct", files / "ball.ply", *PLACE, *option, f"/sys/out.{kind}")
+    assert code == 1
+    assert f'cannot write "out.{kind}" (Permission denied): get the right to write there, or choose' in err
 
 
 @pytest.mark.parametrize(("option", "kind"), WRITERS)

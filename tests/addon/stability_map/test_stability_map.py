@@ -411,6 +411,7 @@ def test_faces_of_no_area_are_nothing_to_feel(empty):
     [
         ({"spacing": -0.1}, "The spacing is a length"),
         ({"spacing": np.nan}, "The spacing is a length"),
+        ({"spacing": 0.005}, r'The spacing 5 mm takes over 1,000,000 touches of "Sphere": use a larger one'),
         ({"extent": 50.0}, "longer than"),
         ({"extent": 0.1, "step": 0.2}, "The step 0.2 m is longer"),
         ({"extent": 0.1, "step": 0.09}, "of the 3 contacts it needs"),

@@ -68,6 +68,9 @@ BARE = "curve,x,y,z,nx,ny,nz\n1,0,0,0,0,0,1\n1,1,2,3,0,0,1\n"
         TITLE + NOTES.replace("1 2 3.5", "1, 2, 3.5") + BARE,
         TITLE + NOTES.replace("#", "//") + BARE,
         TITLE + BARE + NOTES,
+        TITLE + NOTES.replace("#", "#!") + BARE,
+        re.sub(r"[^,\n]+", r'"\g<0>"', TITLE + NOTES + BARE),
+        re.sub(r".+", r'"\g<0>"', TITLE + NOTES) + BARE,
     ],
 )
 def test_what_comments_state_is_read_however_it_is_spelled(text):

@@ -8,6 +8,7 @@ surfaces with one thing broken. `pytest --hypothesis-show-statistics` says how m
 
 import copy
 import math
+import re
 from functools import cache
 
 import numpy as np
@@ -104,7 +105,7 @@ def is_sentence(error):
         return known and len(words) < 400 and "nan" not in words
     return (
         type(error) is ValueError
-        and any(words.startswith(f"{n}: expected ") for n in NAMES.split("|"))
+        and re.match(rf"({NAMES})(\[\d+\])?: expected ", words)
         and (", got " in words and "\n" not in words and len(words) < 300)
     ) or words == ENDLESS
 

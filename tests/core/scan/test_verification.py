@@ -208,6 +208,27 @@ def test_another_layer_than_the_nearest_does_not_count():
     assert len(seen(lifted, roofed, vertices[~on_roof])) > 50
 
 
+def test_the_inside_seen_through_a_mouth_does_not_count():
+    """A patch spans the mouth of a scan that is open: its bottom, seen from inside, has its outside down."""
+    surface = SURFACES["plane"]
+    r = touched(surface)
+    up, depth = r.frame.axes[:, 2], 0.3 * r.radius
+    rim = Cut(surface, r.frame.origin, r.frame.axes[:, 0])
+
+    class Open:
+        def ray_cast(self, origin, direction, distance):
+            hit = rim.ray_cast(origin, direction, distance)
+            if hit is None:
+                below = surface.ray_cast(origin + depth * up, direction, distance)
+                hit = below and (below[0] - depth * up, np.negative(below[1]))
+            return hit
+
+    vertices = vertices_of(surface, r)
+    over_mouth = (vertices - r.frame.origin) @ r.frame.axes[:, 0] < 0.0
+    assert len(seen(r, Open(), vertices[over_mouth] - depth * up)) == 0
+    assert len(seen(r, Open(), vertices[~over_mouth])) > 150
+
+
 def test_further_contours_begin_below_an_overhang():
     """A roof over the point hides it, but the patch is below it."""
     surface = SURFACES["sphere"]
