@@ -18,7 +18,7 @@ from ..steps import chunked
 from ..triangles import normalized, row_dot, triangle_cross
 from .charts import Charts
 from .connectivity import Indices
-from .field import Blend, distances_within_rims, nearest_sheet, sheet_facing
+from .field import INSIDE, Blend, distances_within_rims, nearest_sheet, sheet_facing
 from .indicator import Indicator
 from .lattice import Lattice, lattice_at_level, turned
 
@@ -133,7 +133,8 @@ def _sides(charts: Charts, cell: float, pitch: float, band: float, places: Array
     pairs, count = charts.pairs(places, band), len(places)
     every, side, found = nearest_sheet(charts, pairs, count), np.zeros(count), []
     distances, away = distances_within_rims(charts, pairs), np.full(count, np.inf)
-    np.minimum.at(away, pairs.point_index, distances)
+    is_felt = pairs.rho < INSIDE
+    np.minimum.at(away, pairs.point_index[is_felt], distances[is_felt])
     is_near = distances <= away[pairs.point_index] + AS_NEAR * pitch
     for way in (-1.0, 1.0):
         is_there = np.sign(pairs.distance) == way

@@ -19,7 +19,7 @@ from ..steps import result_of
 from .finger import finger_at
 from .rims import radial_extent
 from .samples import OPPOSITE, THIN_SHARE
-from .touching import FIRST_EXTENT, NEAR, SIZE
+from .touching import FIRST_EXTENT, NEAR
 
 # python -m benchmarks.add_menu --expected judges these.
 ROUNDS, AT_ONCE = 3, 4  # The rounds, and the touches of each, at places that none before covers.
@@ -51,7 +51,7 @@ def expected_touches(
     p, up = _places(points, outward)
     number("area", area, above=0.0)
     options = ExplorationOptions(
-        farthest=FIRST_EXTENT * tolerance, largest_std=SIZE * tolerance, noise=noise, rng=generator_of(rng)
+        farthest=FIRST_EXTENT * tolerance, largest_std=tolerance, noise=noise, rng=generator_of(rng)
     )
     left, tried = np.arange(len(p)), 0
     areas: list[float] = []  # Of the patches at places that none before covers,

@@ -34,7 +34,6 @@ MOST = 1000  # There are at most this many touches, unless the caller says other
 FIRST_EXTENT = 300.0  # A half curve of the first touch is at most this many tolerances long.
 GOOD = 10.0  # The first patch is looked for near the start if its radius is below this many tolerances,
 AWAY, AROUND = (10.0, 30.0), 8  # at these many tolerances away, in this many directions.
-SIZE = 1.4  # A patch may have a mean deviation of this many tolerances before its neighbors are known.
 SMALL = 5.0  # Touches do not go on from a patch whose radius is below this many tolerances.
 NARROW = 1.0  # Where a touch was in vain before, a patch needs a radius of only this many tolerances.
 SIDE_BY_SIDE = 8  # This many touches at once are faster, and still done in a tenth of a second.
@@ -99,7 +98,7 @@ def touch_all_over(
     most, generator = int(number("most", most, least=1.0)), generator_of(rng)
     if tolerance < noise:
         raise ValueError(f"tolerance: expected the noise {noise:g} or more, got {tolerance:g}")
-    options = ExplorationOptions(noise=noise, rng=generator, largest_std=SIZE * tolerance)
+    options = ExplorationOptions(noise=noise, rng=generator, largest_std=tolerance)
     run = _Run(surface, tolerance, most, options)
     if earlier:
         yield from run.taking_up(earlier)
@@ -188,7 +187,7 @@ class _Run:
         self.frontier = self._frontier(vector_of(frame.origin), vector_of(frame.axes[:, 2]), step)
         self.done = len(earlier)
         for e in earlier:
-            is_sure = e.result.mean_height_std <= SIZE * self.tolerance
+            is_sure = e.result.mean_height_std <= self.tolerance
             if is_sure and self.frontier.add(e.result, NARROW * self.tolerance, SMALL * self.tolerance):
                 self.found.append(e)
                 yield from self.show(self.now(new=[e]))
