@@ -23,7 +23,6 @@ from typing import NamedTuple
 import numpy as np
 
 import core
-from core.atlas.touching import SIZE
 from tests import solids
 from tools import blender
 
@@ -290,7 +289,7 @@ def touched(thing, tolerance, number):
         some = spread(points, SHELLS)
         across, areas = _across(thing.vertices, thing.triangles)
         normals = across[face[some]] / (2.0 * areas[face[some], None])
-        wanted = {"farthest": 0.3, "largest_std": SIZE * tolerance, "noise": NOISE, "rng": number}
+        wanted = {"farthest": 0.3, "largest_std": tolerance, "noise": NOISE, "rng": number}
         found = core.explore_many(thing, points[some], normals, **wanted)
         found = [e for e in found if not isinstance(e, ValueError)]
         return put_together(found, tolerance), found, SHELLS
