@@ -30,13 +30,11 @@ from .taps import tapped
 # to short, then the same with half the step. Fewer give less area on scans.
 RUNGS = (16, 13, 11, 9)
 HALVINGS = 6  # The step is halved this many times. Fewer leave touches of coarse meshes in doubt.
-# Contacts smoother than SMOOTH are fitted first: with 0.006 patches of scans have a seventh less area, with
-SMOOTH = 0.0085  # more there are more fits.
-ROUGH = 0.03  # Then those up to this roughness are fitted: with SMOOTH, five of 900 more are in doubt.
-# A sure patch is off its taps by at most this share of the radius in the mean: with 0.02 one of 900 is off by
-TAPS_OFF = 0.015  # over 2 %, with 0.01 there is a seventh less area.
-# There is no surface at this share of its area at most: with 0.04 a patch spans the hole of a washer.
-LARGE_GAP = 0.02
+# Contacts up to this roughness are fitted: with 0.015 there are half as many fits more, with
+ROUGH = 0.01  # PENDING
+# A sure patch is off its taps by at most this share of the radius in the mean, where a place without surface
+# is off by the radius: with 0.02 one of 900 is off by over 2 %, with 0.01 there is a seventh less area.
+TAPS_OFF = 0.015
 HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed, e20b52a).
 
 Answer = Reconstruction | DegenerateCurvesError
@@ -144,29 +142,24 @@ class Touch:
         return (yield from self._by_method(self._with_taps(best)))
 
     def _in_order(self) -> Iterator[tuple[float, int]]:
-        """Steps and numbers of contacts of half curves to be fitted: smooth ones first, from long to short.
+        """Steps and numbers of contacts of half curves to be fitted, from long to short.
 
         Those that end at the point, or are rough, carry no sure fit. If all do, it is the smoothest of them.
         """
-        others: list[tuple[float, tuple[float, int]]] = []
-        any_smooth = False
+        explained = max(self.options.noise, self.options.largest_std or 0.0)
+        smoothest, least = (self.farthest / RUNGS[0], RUNGS[0]), math.inf
         for rung in self._rungs():
             contours, _ = next(self._denser(*rung))
-            points = np.vstack([contour.points for contour in contours])
-            rough = roughness(points - self.point, self.options.explained)
             if stops_at(contours, self.point):
-                rough = math.inf
-            if rough <= SMOOTH:
-                any_smooth = True
+                continue
+            points = np.vstack([contour.points for contour in contours])
+            rough = roughness(points - self.point, explained)
+            if rough <= ROUGH:
                 yield rung
-            else:
-                others.append((rough, rung))
-        chosen = [rung for rough, rung in others if rough <= ROUGH]
-        if not (chosen or any_smooth):
-            chosen = [
-                min(others, key=lambda other: other[0])[1] if others else (self.farthest / RUNGS[0], RUNGS[0])
-            ]
-        yield from chosen
+            if rough < least:
+                smoothest, least = rung, rough
+        if least > ROUGH:
+            yield smoothest
 
     def _rungs(self) -> Iterator[tuple[float, int]]:
         """Steps and numbers of contacts of half curves, from long to short.
@@ -218,14 +211,14 @@ class Touch:
 
     def _by_method(self, found: Exploration) -> Steps:
         """The touch with its fit by the method of the options."""
-        if self.options.is_bayes:
+        if self.options.method == "bayes":
             return found
         return self._with_taps(replace(found, result=(yield from _fitted(found.contours))))
 
     def _with_taps(self, found: Exploration) -> Exploration:
         """The touch together with its taps."""
         r = found.result
-        if not self.options.is_tapped:
+        if self.options.largest_std is not None:  # It judges the fit in place of shares of the radius.
             return found
         taps, contacts = tapped(self.surface, r, np.concatenate(self.tapped))
         self.tapped.append(contacts)
@@ -274,7 +267,7 @@ def _is_sure(found: Exploration, options: ExplorationOptions) -> bool:
         return False
     if r.taps is None:
         return _explains(found, options)
-    return r.taps.missing <= LARGE_GAP and (r.taps.height or 0.0) <= TAPS_OFF * r.radius
+    return (r.taps.height or 0.0) / r.radius + r.taps.missing <= TAPS_OFF
 
 
 def _explains(found: Exploration, options: ExplorationOptions) -> bool:

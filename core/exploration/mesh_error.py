@@ -15,10 +15,8 @@ from ..reconstruction.status import CONTRADICTING, DOUBTFUL_GAP, useless
 from ..verdict import OK, Doubt, beyond
 
 # benchmarks.refusals of e20b52a counted the patches that are off, but ok.
-MESH_LAYERS = 8  # A sample is compared with no more layers of the mesh above and below it,
-HAIR = 1e-4  # and rays go on this share of their reach beyond each.
-# Rays begin at this share of the radius above a patch: one tells where the surface is near, as it mostly is.
-ABOVE = 0.01
+HAIR = 1e-4  # Rays go on this share of their reach beyond each layer of the mesh.
+ABOVE = 0.01  # A ray from this share of the radius above a point meets its own layer.
 
 
 class MeshError(NamedTuple):
@@ -34,25 +32,26 @@ class MeshError(NamedTuple):
 
 def mesh_error(r: Reconstruction, surface: Surface) -> MeshError:
     """How far the surface is off the patch, by rays at the Gauss points of the domain."""
-    return mean_error(r, heights_at(r, surface, r.domain.nodes[0], side_of(r, surface)))
+    return mean_error(r, node_heights(r, surface))
 
 
 def mean_error(r: Reconstruction, heights: Array) -> MeshError:
-    """The error of the `heights` at the nodes of the domain, as `heights_at` has them."""
+    """The error of the heights at the Gauss points of the domain, as `node_heights` has them."""
     _, weights = r.domain.nodes
     met = ~np.isnan(heights)
     height = float(np.average(np.abs(heights[met]), weights=weights[met])) if met.any() else None
     return MeshError(height, float(weights[~met].sum()))
 
 
-def heights_at(r: Reconstruction, surface: Surface, points: Array, side: float) -> Array:
-    """The height of the surface above the patch at local points (n, 2); NaN where there is no surface."""
-    feet, up = r.frame.to_world(np.column_stack([points, r.height(*points.T)])), vector_of(r.frame.axes[:, 2])
+def node_heights(r: Reconstruction, surface: Surface) -> Array:
+    """The height of the surface above the patch at the domain's Gauss points, or NaN where there is none."""
+    nodes, side = r.domain.nodes[0], _side_of(r, surface)
+    feet, up = r.frame.to_world(np.column_stack([nodes, r.height(*nodes.T)])), vector_of(r.frame.axes[:, 2])
     heights = (layer_height(surface, vector_of(foot), up, r.radius, side) for foot in feet.tolist())
     return np.array([math.nan if height is None else height for height in heights])
 
 
-def side_of(r: Reconstruction, surface: Surface) -> float:
+def _side_of(r: Reconstruction, surface: Surface) -> float:
     """1 if the outside of the surface is up at the point, or -1 if it is down: a sheet has either side."""
     up, reach = vector_of(r.frame.axes[:, 2]), ABOVE * r.radius
     start = along(vector_of(r.frame.origin), up, reach)
@@ -82,19 +81,14 @@ def layer_height(
     are outward ones, except on the undersides of walls, which count as layers then.
     """
     down, hair, nearest = scaled(up, -1.0), HAIR * reach, None
-    for top in (ABOVE * reach, reach):
-        height, bottom = top, -top
-        for _ in range(MESH_LAYERS):
-            length = height - bottom
-            hit = surface.ray_cast(along(start, up, height), down, length) if length > 0.0 else None
-            if hit is None:
-                break
-            point, normal = contact_of(hit, side)
-            height = dot(along(point, start, -1.0), up)
-            if dot(normal, up) > 0.0:
-                nearest = height
-                bottom = -abs(height)
-            height -= hair
-        if nearest is not None:
+    height, bottom = reach, -reach
+    while height > bottom:
+        hit = surface.ray_cast(along(start, up, height), down, height - bottom)
+        if hit is None:
             break
+        point, normal = contact_of(hit, side)
+        height = dot(along(point, start, -1.0), up)
+        if dot(normal, up) > 0.0:
+            nearest, bottom = height, -abs(height)
+        height -= hair
     return nearest

@@ -76,21 +76,6 @@ class ExplorationOptions:
         """The options of the fit that is returned. The contours have their own noise."""
         return FitOptions(self.method, self.degree, None, None, self.weight, self.solver)
 
-    @property
-    def explained(self) -> float:
-        """The deviation that contacts may have: their noise, or what the patch may be off if that is more."""
-        return max(self.noise, self.largest_std or 0.0)
-
-    @property
-    def is_bayes(self) -> bool:
-        """Whether the fit that is returned is the one that the extent is chosen by."""
-        return self.method == "bayes"
-
-    @property
-    def is_tapped(self) -> bool:
-        """Whether the finger taps between the curves: only if shares of the radius judge the fit."""
-        return self.largest_std is None
-
 
 def _length(name: str, length: float | str | None) -> float | None:
     """The length checked, or None for None and "auto"."""

@@ -13,9 +13,7 @@ from ..reconstruction.result import Reconstruction
 CONTACTS = 12  # A half curve of a given extent has this many contacts,
 DENSER = (1, 2, 4)  # and any the first of these multiples that suffices.
 # More contacts help if twice as many would lower the mean deviation of the height by the share NOTICEABLE.
-# They cannot, if noise is below QUIET times that deviation.
 NOTICEABLE = 0.15
-QUIET = 1.0
 
 
 def suffices(r: Reconstruction) -> bool:
@@ -24,14 +22,12 @@ def suffices(r: Reconstruction) -> bool:
     They would not if this deviation is less than any polynomial is off a surface, nor if it is larger than
     the noise: then it comes from directions in which these curves have no contacts.
     """
-    if r.mean_height_std <= MISFIT * r.radius or r.posterior.noise * r.radius <= QUIET * r.mean_height_std:
+    if r.mean_height_std <= MISFIT * r.radius or r.posterior.noise * r.radius <= r.mean_height_std:
         return True
     (points, weights), contacts = r.domain.nodes, r.contacts[:, :2]
-    places = r.posterior.places
-    if not len(places):
-        which = np.linspace(0, len(contacts) - 1, min(len(contacts), MOST_PLACES)).astype(np.intp)
-        places = contacts[which] / r.radius
-    nodes, m = points / r.radius, len(places)
+    m = min(len(contacts), MOST_PLACES)
+    places = contacts[np.linspace(0, len(contacts) - 1, m).astype(np.intp)] / r.radius
+    nodes = points / r.radius
     shared, covariance = r.posterior.covariances_with(nodes)(places)
     # A patch by another method departs from the posterior's mean, and more contacts do not lower that.
     variance = (r.node_stds / r.radius if r.method == "bayes" else r.posterior.height_std(*nodes.T)) ** 2
