@@ -102,11 +102,14 @@ class Touch:
 
     def steps(self) -> Steps:
         """The touch, with planes added while they help. They make a patch more certain, not larger."""
-        extent, tolerance = self.options.extent, self.options.tolerance
+        extent, tolerance, method = self.options.extent, self.options.tolerance, self.options.method
         if extent is None:
             found = yield from self._longest_sure()
+            if method != "bayes":
+                found = replace(found, result=(yield from _fitted(found.contours)))
         else:
-            found = self._with_taps((yield from self._felt(extent / CONTACTS, CONTACTS)))
+            found = yield from self._felt(extent / CONTACTS, CONTACTS)
+        found = self._with_taps(found)
         stds = [found.result.mean_height_std]
         while tolerance is not None and stds[-1] > tolerance and len(found.planes) < self.options.most_planes:
             plane, expected = suggest_plane(found.result, self.reference[:, 1], self.reference[:, 0])
@@ -134,12 +137,11 @@ class Touch:
                 error = error or why
                 continue
             if _is_sure(found, self.options) and _is_sure(found := self._with_taps(found), self.options):
-                return (yield from self._by_method(found))
+                return found
             tried.append(found)
         if error is not None and not tried:
             raise error
-        best = min(tried, key=lambda e: (e.result.status != "ok", e.result.mean_height_std / e.result.radius))
-        return (yield from self._by_method(self._with_taps(best)))
+        return min(tried, key=lambda e: (e.result.status != "ok", e.result.mean_height_std / e.result.radius))
 
     def _in_order(self) -> Iterator[tuple[float, int]]:
         """Steps and numbers of contacts of half curves to be fitted, from long to short.
@@ -166,36 +168,23 @@ class Touch:
 
         Half curves that the surface ends all are the same on longer rungs, which are left out.
         """
-        given = self.options.step
-        if given is not None:
-            self._followed(given, self.farthest)
-            most = self.farthest / given * (1.0 + 1e-6)
-            counts = [int(most * n / RUNGS[0] / 2.0**k) for k in range(HALVINGS + 1) for n in RUNGS]
-            yield from ((given, count) for count in dict.fromkeys(counts) if count)
-            return
         for halvings in range(HALVINGS + 1):
-            step = self.farthest / RUNGS[0] / 2.0**halvings
-            contours = self._followed(step, RUNGS[0] * step)
+            finest = self.farthest / RUNGS[0] / 2.0**halvings
+            step = self.options.step or finest
+            contours = self._followed(step, RUNGS[0] * finest)
             longest = max(max(_sides(contour, self.point)) for contour in contours)
-            for count, shorter in pairwise((*RUNGS, RUNGS[0] // 2)):
-                if longest > shorter:
-                    yield step, count
+            counts = [int(n * finest / step * (1.0 + 1e-6)) for n in (*RUNGS, RUNGS[0] // 2)]
+            yield from ((step, count) for count, shorter in pairwise(counts) if min(longest, count) > shorter)
 
     def _felt(self, step: float, count: int) -> Steps:
         """The touch with half curves of this length, and the first number of contacts that suffices."""
-        found: Exploration | DegenerateCurvesError
-        for contours, between in self._denser(step, count):
-            try:
-                r = yield from _fitted(contours, self.options.extent is None)
-            except DegenerateCurvesError as error:
-                found = error
-                continue
-            found = Exploration(contours, r, step * count, between, tuple(self.options.planes))
-            if suffices(r):
+        for contours, between in self._denser(step, count):  # noqa: B007
+            r = yield Request(contours, self.options.extent is None)
+            if isinstance(r, Reconstruction) and suffices(r):
                 break
-        if isinstance(found, DegenerateCurvesError):
-            raise found
-        return found
+        if isinstance(r, DegenerateCurvesError):
+            raise r
+        return Exploration(contours, r, step * count, between, tuple(self.options.planes))
 
     def _denser(self, step: float, count: int) -> Iterator[tuple[list[Contour], float]]:
         """Contours with half curves of `count` contacts, then more often felt, and their steps.
@@ -209,16 +198,11 @@ class Touch:
             if between == steps[-1] or self.options.extent or not stops_at(contours, self.point):
                 yield contours, between
 
-    def _by_method(self, found: Exploration) -> Steps:
-        """The touch with its fit by the method of the options."""
-        if self.options.method == "bayes":
-            return found
-        return self._with_taps(replace(found, result=(yield from _fitted(found.contours))))
-
     def _with_taps(self, found: Exploration) -> Exploration:
         """The touch together with its taps."""
         r = found.result
-        if self.options.largest_std is not None:  # It judges the fit in place of shares of the radius.
+        # A largest deviation judges the fit in place of shares of the radius.
+        if r.taps is not None or self.options.largest_std is not None:
             return found
         taps, contacts = tapped(self.surface, r, np.concatenate(self.tapped))
         self.tapped.append(contacts)
@@ -235,24 +219,24 @@ class Touch:
 
     def _cut(self, step: float, count: int) -> list[Contour]:
         """The contours of the planes with half curves of `count` contacts this step apart."""
-        contours, extent = self._followed(step, step * count), step * count
-        if self.options.extent is not None or extent >= self.farthest * (1.0 - 1e-6):
+        contours = self._followed(step, step * count)
+        if count >= int(self.farthest / step * (1.0 + 1e-6)):
             return contours
         return [_shortened(contour, self.point, count) for contour in contours]
 
     def _with_plane(self, found: Exploration, plane: SamplingPlane) -> Steps:
         """The touch with one plane more. Raises ValueError if nothing can be felt along it."""
         (more,) = self.follow((plane,), step=found.step)(found.extent)
-        if self.options.extent is None and found.extent < self.farthest:
+        if found.extent < self.farthest:
             more = _shortened(more, self.point, len(more.points))
         contours = [*found.contours, more]
         r = yield from _fitted(contours)
         return self._with_taps(replace(found, contours=contours, result=r, planes=(*found.planes, plane)))
 
 
-def _fitted(contours: list[Contour], searching: bool = False) -> Fit:
+def _fitted(contours: list[Contour]) -> Fit:
     """The reconstruction of contours. Raises DegenerateCurvesError if they carry none."""
-    r = yield Request(contours, searching)
+    r = yield Request(contours)
     if isinstance(r, DegenerateCurvesError):
         raise r
     return r

@@ -32,21 +32,21 @@ class MeshError(NamedTuple):
 
 def mesh_error(r: Reconstruction, surface: Surface) -> MeshError:
     """How far the surface is off the patch, by rays at the Gauss points of the domain."""
-    return mean_error(r, node_heights(r, surface))
+    return mean_error(r, heights_at(r, surface, r.domain.nodes[0]))
 
 
 def mean_error(r: Reconstruction, heights: Array) -> MeshError:
-    """The error of the heights at the Gauss points of the domain, as `node_heights` has them."""
+    """The error of the heights at the Gauss points of the domain, as `heights_at` has them."""
     _, weights = r.domain.nodes
     met = ~np.isnan(heights)
     height = float(np.average(np.abs(heights[met]), weights=weights[met])) if met.any() else None
     return MeshError(height, float(weights[~met].sum()))
 
 
-def node_heights(r: Reconstruction, surface: Surface) -> Array:
-    """The height of the surface above the patch at the domain's Gauss points, or NaN where there is none."""
-    nodes, side = r.domain.nodes[0], _side_of(r, surface)
-    feet, up = r.frame.to_world(np.column_stack([nodes, r.height(*nodes.T)])), vector_of(r.frame.axes[:, 2])
+def heights_at(r: Reconstruction, surface: Surface, points: Array) -> Array:
+    """The height of the surface above the patch at local points (n, 2); NaN where there is no surface."""
+    feet, up = r.frame.to_world(np.column_stack([points, r.height(*points.T)])), vector_of(r.frame.axes[:, 2])
+    side = _side_of(r, surface)
     heights = (layer_height(surface, vector_of(foot), up, r.radius, side) for foot in feet.tolist())
     return np.array([math.nan if height is None else height for height in heights])
 

@@ -170,7 +170,5 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
 
 def _with_stds(results: list[Answer]) -> list[Answer]:
     """Results whose mean_height_std is computed for many at once."""
-    if len(results) == 1:
-        return results
     known = iter(with_height_stds([r for r in results if isinstance(r, Reconstruction)]))
     return [next(known) if isinstance(r, Reconstruction) else r for r in results]
