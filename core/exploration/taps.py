@@ -11,7 +11,7 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import CONTRADICTING, Taps
 from .mesh_error import heights_at, mean_error
 
-# Four taps between the ends of two curves are at this share of the way to the boundary: without them two of 540
+# Four taps between two ends of curves are at this share of the way to the boundary: without them two of 540
 # touches of scans miss a pocket (benchmarks.real --only automatic).
 NEAR_RIM = 0.98
 TOO_FAR_OFF = 10.0  # A tap that is off by more deviations contradicts the fit by itself.
