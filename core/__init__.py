@@ -40,7 +40,7 @@ from .paper.by_method import SOLVERS
 from .patch.domain import Domain
 from .patch.geometry import Geometry, distances, fit_error, overlapped
 from .patch.monge import MongePatch
-from .reconstruction.deviations import gaussian_curvature_stds, mean_height_stds, with_height_stds
+from .reconstruction.deviations import gaussian_curvature_stds
 from .reconstruction.from_contours import reconstruct, reconstruct_many
 from .reconstruction.next_plane import azimuth_of, suggest_plane
 from .reconstruction.options import METHODS
@@ -112,7 +112,6 @@ __all__ = [
     "gaussian_curvature_stds",
     "in_running_order",
     "is_beside_bend",
-    "mean_height_stds",
     "mesh_error",
     "open_edge_distance",
     "orientation_fault",
@@ -136,5 +135,4 @@ __all__ = [
     "verifying",
     "vertices_shown",
     "with_facets",
-    "with_height_stds",
 ]

@@ -35,6 +35,7 @@ ROUGH = 0.01  # PENDING
 # A sure patch is off its taps by at most this share of the radius in the mean, where a place without surface
 # is off by the radius: with 0.02 one of 900 is off by over 2 %, with 0.01 there is a seventh less area.
 TAPS_OFF = 0.015
+NOISY_STD = 0.02
 HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed, e20b52a).
 
 Answer = Reconstruction | DegenerateCurvesError
@@ -139,6 +140,9 @@ class Touch:
             if _is_sure(found, self.options) and _is_sure(found := self._with_taps(found), self.options):
                 return found
             tried.append(found)
+            r = found.result
+            if r.mean_height_std > NOISY_STD * r.radius and not suffices(r):
+                break
         if error is not None and not tried:
             raise error
         return min(tried, key=lambda e: (e.result.status != "ok", e.result.mean_height_std / e.result.radius))

@@ -14,10 +14,8 @@ from ..arguments import LARGEST, Array, finite_array, unit_vector
 from ..contours.contour import EXTENT, Contour, SamplingPlane, Vector, along, scaled, vector_of
 from ..contours.finger import SAME_SHEET_COSINE, Surface, contact_of
 from ..contours.tracking import generator_of, track, tracker
-from ..reconstruction.deviations import with_height_stds
 from ..reconstruction.from_contours import fitted
 from ..reconstruction.options import FitOptions
-from ..reconstruction.result import Reconstruction
 from ..reconstruction.start import Given
 from ..reconstruction.strokes import gathered
 from .extent import Answer, Exploration, Request, Steps, Touch
@@ -163,12 +161,6 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
             touches = [Given(requests[i].contours, *gathered(())) for i in which]
             if which:
                 results = fitted(points[which], touches, outward[which], options)
-                answers.update(zip(which, _with_stds(results), strict=True))
+                answers.update(zip(which, results, strict=True))
                 yield
     return [found[i] for i in range(len(steps))]
-
-
-def _with_stds(results: list[Answer]) -> list[Answer]:
-    """Results whose mean_height_std is computed for many at once."""
-    known = iter(with_height_stds([r for r in results if isinstance(r, Reconstruction)]))
-    return [next(known) if isinstance(r, Reconstruction) else r for r in results]

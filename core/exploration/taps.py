@@ -7,6 +7,7 @@ import numpy as np
 from ..arguments import Array
 from ..contours.finger import Surface
 from ..patch.domain import GAUSS_ALONG, Domain
+from ..reconstruction.explained import too_far
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import CONTRADICTING, Taps
 from .mesh_error import heights_at, mean_error
@@ -14,7 +15,6 @@ from .mesh_error import heights_at, mean_error
 # Four taps between two ends of curves are at this share of the way to the boundary: without them two of 540
 # touches of scans miss a pocket (benchmarks.real --only automatic).
 NEAR_RIM = 0.98
-TOO_FAR_OFF = 10.0  # A tap that is off by more deviations contradicts the fit by itself.
 
 
 def places(domain: Domain) -> Array:
@@ -37,12 +37,10 @@ def tapped(surface: Surface, r: Reconstruction, felt: Array) -> tuple[Taps, Arra
     contacts = r.frame.to_world(np.column_stack([x, y, r.height(x, y) + heights])[met])
     local = r.frame.to_local(np.concatenate([contacts, felt]))
     x, y, z = local[r.domain.contains(*local[:, :2].T)].T
-    off, noise = (
-        np.abs(z - r.height(x, y)),
-        max((contour.noise or 0.0 for contour in r.contours), default=0.0),
-    )
+    off = np.abs(z - r.height(x, y))
+    noise = max((contour.noise or 0.0 for contour in r.contours), default=0.0)
     error = mean_error(r, heights[:weighted])
-    contradicts = (off > TOO_FAR_OFF * np.hypot(r.height_std(x, y), noise)).any() or (
+    contradicts = too_far(off, np.hypot(r.height_std(x, y), noise)).any() or (
         (error.height or 0.0) > CONTRADICTING * r.mean_height_std
     )
     most = float(off.max(initial=0.0)) / r.radius if contradicts else 0.0

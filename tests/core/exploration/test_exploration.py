@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull
 
 import core
 from core.exploration import extent, side_by_side
-from core.exploration.sampling_density import NOTICEABLE, suffices
+from core.exploration.sampling_density import suffices
 from core.reconstruction.from_contours import fitted
 from core.reconstruction.status import DOUBTFUL_STD
 
@@ -443,8 +443,8 @@ def test_contacts_are_enough_where_twice_as_many_take_a_sixth_off_at_most():
         once = surface.fit(surface.track(planes, step=step, noise=noise, rng=1))
         twice = surface.fit(surface.track(planes, step=step / 2.0, noise=noise, rng=1))
         share = twice.mean_height_std / once.mean_height_std
-        if abs(share - (1.0 - NOTICEABLE)) > 0.1:
-            assert suffices(once) == (share > 1.0 - NOTICEABLE)
+        if abs(share - 0.85) > 0.1:
+            assert suffices(once) == (share > 0.85)
 
 
 def test_how_far_to_feel_is_found_where_curves_end_by_themselves():
