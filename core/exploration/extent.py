@@ -15,27 +15,30 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import Array
-from ..bayes.roughness import roughness
+from ..bayes.joint_fit import MISFIT
+from ..bayes.roughness import EXPLAINED_TERMS, roughness
 from ..contours.contour import EXTENT, SURFACE_STOPS, UNEXPLAINED, Contour, SamplingPlane, stops_at
 from ..contours.finger import Surface
 from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.explained import are_few, too_far
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
+from ..reconstruction.status import DOUBTFUL_STD
 from .options import ExplorationOptions
-from .sampling_density import CONTACTS, DENSER, suffices
 from .taps import tapped
 
 # benchmarks.real --only automatic chose these. Half curves of these numbers of contacts are tried, from long
 # to short, then the same with half the step. Fewer give less area on scans.
 RUNGS = (16, 13, 11, 9)
 HALVINGS = 6  # The step is halved this many times. Fewer leave touches of coarse meshes in doubt.
-# Contacts up to this roughness are fitted: with 0.015 there are half as many fits more, with
-ROUGH = 0.01  # PENDING
+# Contacts up to this roughness are fitted: with 0.012 there are a quarter more fits and two of 540 more are
+ROUGH = 0.01  # sure, with 0.0085 patches are smaller.
 # A sure patch is off its taps by at most this share of the radius in the mean, where a place without surface
 # is off by the radius: with 0.02 one of 900 is off by over 2 %, with 0.01 there is a seventh less area.
 TAPS_OFF = 0.015
-NOISY_STD = 0.02
+# A half curve of a given extent has this many contacts, and any the first of these multiples that suffices
+# (benchmarks.amount of e20b52a).
+CONTACTS, DENSER = 12, (1, 2, 4)
 HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed, e20b52a).
 
 Answer = Reconstruction | DegenerateCurvesError
@@ -120,8 +123,7 @@ class Touch:
                 more = yield from self._with_plane(found, plane)
             except ValueError:  # Nothing can be felt along that plane. What was felt so far stays.
                 break
-            is_in_doubt = found.result.status == "ok" != more.result.status
-            if is_in_doubt or more.result.mean_height_std >= stds[-1]:
+            if found.result.status == "ok" != more.result.status or more.result.mean_height_std >= stds[-1]:
                 break
             found = more
             stds.append(found.result.mean_height_std)
@@ -141,8 +143,8 @@ class Touch:
                 return found
             tried.append(found)
             r = found.result
-            if r.mean_height_std > NOISY_STD * r.radius and not suffices(r):
-                break
+            if r.mean_height_std > DOUBTFUL_STD * r.radius and not suffices(r):
+                break  # Noise leaves shorter half curves even less certain.
         if error is not None and not tried:
             raise error
         return min(tried, key=lambda e: (e.result.status != "ok", e.result.mean_height_std / e.result.radius))
@@ -244,6 +246,16 @@ def _fitted(contours: list[Contour]) -> Fit:
     if isinstance(r, DegenerateCurvesError):
         raise r
     return r
+
+
+def suffices(r: Reconstruction) -> bool:
+    """Whether noise makes at most half of the mean variance of the height, which more contacts would lower.
+
+    The other half comes from directions in which these curves have no contacts. More contacts do not help
+    either if the deviation is less than any polynomial is off a surface.
+    """
+    by_noise = EXPLAINED_TERMS * float(r.posterior.noise * r.radius) ** 2 / len(r.contacts)
+    return r.mean_height_std <= MISFIT * r.radius or by_noise <= 0.5 * r.mean_height_std**2
 
 
 def _is_sure(found: Exploration, options: ExplorationOptions) -> bool:

@@ -19,14 +19,14 @@ MOST_EVEN = 24  # At most this many planes are laid out evenly.
 
 def planes_of(planes: int | Sequence[SamplingPlane]) -> tuple[SamplingPlane, ...]:
     """This many evenly spread planes, or the planes that are given. Raises ValueError for neither."""
-    if not isinstance(planes, int | np.integer):
+    if isinstance(planes, int | np.integer):
+        is_possible = 3 <= planes <= MOST_EVEN
+        found = tuple(SamplingPlane(math.pi * i / planes) for i in range(planes)) if is_possible else ()
+    else:
         found = tuple(list_of("planes", planes, SamplingPlane))
-        if not found:
-            raise ValueError(f"planes: expected 3 to {MOST_EVEN}, or sampling planes, got none")
-        return found
-    if not 3 <= planes <= MOST_EVEN:
+    if not found:
         raise ValueError(f"planes: expected 3 to {MOST_EVEN}, or sampling planes, got {planes}")
-    return tuple(SamplingPlane(math.pi * i / planes) for i in range(planes))
+    return found
 
 
 @dataclass(frozen=True, eq=False)

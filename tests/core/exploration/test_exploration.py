@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull
 
 import core
 from core.exploration import extent, side_by_side
-from core.exploration.sampling_density import suffices
+from core.exploration.extent import suffices
 from core.reconstruction.from_contours import fitted
 from core.reconstruction.status import DOUBTFUL_STD
 
