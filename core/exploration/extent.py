@@ -31,10 +31,10 @@ from .taps import tapped
 # to short, then the same with half the step. Fewer give less area on scans.
 RUNGS = (16, 13, 11, 9)
 HALVINGS = 6  # The step is halved this many times. Fewer leave touches of coarse meshes in doubt.
-# Contacts up to this roughness are fitted: with 0.012 there are a quarter more fits and two of 540 more are
-ROUGH = 0.01  # sure, with 0.0085 patches are smaller.
+# Contacts up to this roughness are fitted: with 0.012 there are a quarter more fits, and one of 540 more is
+ROUGH = 0.01  # sure.
 # A sure patch is off its taps by at most this share of the radius in the mean, where a place without surface
-# is off by the radius: with 0.02 one of 900 is off by over 2 %, with 0.01 there is a seventh less area.
+# is off by the radius: with 0.02 sure patches are 6 % farther off, with 0.01 they have a seventh less area.
 TAPS_OFF = 0.015
 # A half curve of a given extent has this many contacts, and any the first of these multiples that suffices
 # (benchmarks.amount of e20b52a).

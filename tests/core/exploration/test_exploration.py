@@ -146,6 +146,14 @@ def test_the_first_length_is_fitted_once_where_it_is_sure(monkeypatch):
     assert len(results) == 1
 
 
+def test_where_noise_leaves_half_curves_uncertain_shorter_ones_are_not_fitted(monkeypatch):
+    surface = surfaces.torus(40, 20, 0.6)
+    given = {"point": surface.point, "normal": surface.normal, "noise": 3.0, "rng": 0}
+    found, results = fits_of(monkeypatch, surface, farthest=20.0, **given)
+    assert found.result.status == "uncertain"
+    assert len(results) <= 5 * len(extent.DENSER)
+
+
 def test_curves_end_before_a_wall_that_is_around_the_point():
     def high(x, y):
         return 1.2 * np.exp(-(((np.hypot(x, y) - 7.0) / 0.5) ** 2))
