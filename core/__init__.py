@@ -32,9 +32,9 @@ from .contours.finger import Surface
 from .contours.local_geometry import DegenerateCurvesError, Frame
 from .contours.tracking import track
 from .exploration.extent import Exploration
-from .exploration.mesh_error import MeshError, doubts_by_mesh, mesh_error
 from .exploration.options import ExplorationOptions
 from .exploration.side_by_side import exploring_many
+from .exploration.taps import MeshError, doubts_by_mesh, mesh_error
 from .exploration.touches import explore, explore_many
 from .paper.by_method import SOLVERS
 from .patch.domain import Domain

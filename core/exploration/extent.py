@@ -17,7 +17,7 @@ import numpy as np
 from ..arguments import Array
 from ..bayes.joint_fit import MISFIT
 from ..bayes.roughness import EXPLAINED_TERMS, roughness
-from ..contours.contour import EXTENT, SURFACE_STOPS, UNEXPLAINED, Contour, SamplingPlane, stops_at
+from ..contours.contour import EXTENT, UNEXPLAINED, Contour, SamplingPlane, stops_at
 from ..contours.finger import Surface
 from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.explained import are_few, too_far
@@ -71,14 +71,10 @@ class Exploration:
     @property
     def reach(self) -> float:
         """The length of the longest half curve; the surface may end all before the extent."""
-        if any(stop not in SURFACE_STOPS for contour in self.contours for stop in contour.stops or ()):
-            return self.extent
-        ends = (_sides(contour, self.result.point) for contour in self.contours)
-        return self.step * max(max(sides) for sides in ends)
+        return self.step * max(max(_sides(contour, self.result.point)) for contour in self.contours)
 
 
 Steps = Generator[Request, Answer, Exploration]
-Fit = Generator[Request, Answer, Reconstruction]
 Follow = Callable[[float], list[Contour]]
 
 
@@ -240,7 +236,7 @@ class Touch:
         return self._with_taps(replace(found, contours=contours, result=r, planes=(*found.planes, plane)))
 
 
-def _fitted(contours: list[Contour]) -> Fit:
+def _fitted(contours: list[Contour]) -> Generator[Request, Answer, Reconstruction]:
     """The reconstruction of contours. Raises DegenerateCurvesError if they carry none."""
     r = yield Request(contours)
     if isinstance(r, DegenerateCurvesError):
@@ -261,13 +257,10 @@ def suffices(r: Reconstruction) -> bool:
 def _is_sure(found: Exploration, options: ExplorationOptions) -> bool:
     """Whether a touch is as certain as the options ask, and its patch explains contacts and taps."""
     r = found.result
-    if options.largest_std:
-        return r.mean_height_std <= options.largest_std and _explains(found, options)
-    if r.status != "ok":
-        return False
-    if r.taps is None:
-        return _explains(found, options)
-    return (r.taps.height or 0.0) / r.radius + r.taps.missing <= TAPS_OFF
+    off = 0.0 if r.taps is None else (r.taps.height or 0.0) / r.radius + r.taps.missing
+    is_ok = r.status == "ok" and off <= TAPS_OFF
+    is_certain = r.mean_height_std <= options.largest_std if options.largest_std else is_ok
+    return is_certain and _explains(found, options)
 
 
 def _explains(found: Exploration, options: ExplorationOptions) -> bool:

@@ -18,11 +18,10 @@ from ..reconstruction.from_contours import fitted
 from ..reconstruction.options import FitOptions
 from ..reconstruction.start import Given
 from ..reconstruction.strokes import gathered
-from .extent import Answer, Exploration, Request, Steps, Touch
-from .mesh_error import HAIR
+from .extent import RUNGS, Answer, Exploration, Request, Steps, Touch
 from .options import ExplorationOptions
+from .taps import HAIR
 
-GLANCE_CONTACTS = 8  # A half curve has this many contacts where it only has to show whether it ends.
 LONGEST = 1e15  # Lengths beyond this multiple of the first that is tried, or below its inverse, are not.
 BISECTIONS = 6  # They narrow a factor of two to a 64th of it,
 SHEET_BISECTIONS = 26  # and these so far that what they began with changes results by less than 1e-6.
@@ -47,10 +46,10 @@ def exploring_many(
     # For a whole object half curves end where another sheet begins, and all others at no angle.
     cosine = SAME_SHEET_COSINE if options.largest_std else -1.0
 
-    def steps(point: Array, direction: Array) -> Steps:
-        """The steps of one touch."""
+    def touch(point: Array, direction: Array) -> Touch:
+        """The touch at one place."""
         place = surface, vector_of(point), vector_of(direction)
-        touch = Touch(
+        return Touch(
             surface,
             partial(
                 tracker, *place, noise=options.noise, rng=generator, tangent=tangent, least_cosine=cosine
@@ -61,9 +60,8 @@ def exploring_many(
             or _farthest(*place, options.planes, partial(track, *place, tangent=tangent)),
             options=options,
         )
-        return (yield from touch.steps())
 
-    return _side_by_side([steps(*place) for place in zip(p, up, strict=True)], p, up, options.fit)
+    return _side_by_side([touch(*place).steps() for place in zip(p, up, strict=True)], p, up, options.fit)
 
 
 def _farthest(
@@ -81,8 +79,8 @@ def _farthest(
     """
 
     def ended(length: float) -> bool:
-        """Whether all half curves, felt coarsely, end before that, or nothing can be felt at this length."""
-        lengths = {"extent": length, "step": length / GLANCE_CONTACTS}
+        """Whether all half curves, felt with few contacts, end before that, or nothing can be felt so."""
+        lengths = {"extent": length, "step": length / RUNGS[-1]}
         try:
             contours = (contour for plane in planes for contour in track_along([plane], **lengths))
             return not any(EXTENT in (contour.stops or ()) for contour in contours)
@@ -105,8 +103,6 @@ def _bracket(ended: Callable[[float], bool], start: float) -> tuple[float, float
         most *= 2.0
         if most > start * LONGEST:
             raise ValueError("The curves do not end by themselves: set farthest, the greatest length to feel")
-    if most > start:
-        return 0.5 * most, most
     while ended(0.5 * most):
         most *= 0.5
         if most * LONGEST < start:
@@ -160,7 +156,8 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
             options = replace(fit, method=method)
             touches = [Given(requests[i].contours, *gathered(())) for i in which]
             if which:
-                results = fitted(points[which], touches, outward[which], options)
-                answers.update(zip(which, results, strict=True))
+                answers.update(
+                    zip(which, fitted(points[which], touches, outward[which], options), strict=True)
+                )
                 yield
     return [found[i] for i in range(len(steps))]

@@ -584,11 +584,8 @@ def test_too_few_or_too_many_planes_are_refused(planes):
         explore(surfaces.plane(), planes=planes)
 
 
-@pytest.mark.parametrize(
-    ("rays", "said"),
-    [(3, "All curves end at once, however short they are"), (40, "point: expected one on the surface, got")],
-)
-def test_a_surface_that_stops_answering_is_reported_in_a_sentence(rays, said):
+@pytest.mark.parametrize("rays", [3, 40])
+def test_a_surface_that_stops_answering_is_reported_in_a_sentence(rays):
     class Tiring:
         left = rays
 
@@ -597,7 +594,7 @@ def test_a_surface_that_stops_answering_is_reported_in_a_sentence(rays, said):
             return surfaces.sphere(20.0).ray_cast(*ray) if self.left >= 0 else None
 
     ball = surfaces.sphere(20.0)
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises(ValueError, match="All curves end at once, however short they are"):
         core.explore(Tiring(), ball.point, ball.normal)
 
 
