@@ -46,10 +46,10 @@ def exploring_many(
     # For a whole object half curves end where another sheet begins, and all others at no angle.
     cosine = SAME_SHEET_COSINE if options.largest_std else -1.0
 
-    def touch(point: Array, direction: Array) -> Touch:
-        """The touch at one place."""
+    def steps(point: Array, direction: Array) -> Steps:
+        """The steps of one touch."""
         place = surface, vector_of(point), vector_of(direction)
-        return Touch(
+        touch = Touch(
             surface,
             partial(
                 tracker, *place, noise=options.noise, rng=generator, tangent=tangent, least_cosine=cosine
@@ -60,8 +60,9 @@ def exploring_many(
             or _farthest(*place, options.planes, partial(track, *place, tangent=tangent)),
             options=options,
         )
+        return (yield from touch.steps())
 
-    return _side_by_side([touch(*place).steps() for place in zip(p, up, strict=True)], p, up, options.fit)
+    return _side_by_side([steps(*place) for place in zip(p, up, strict=True)], p, up, options.fit)
 
 
 def _farthest(
@@ -156,8 +157,7 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
             options = replace(fit, method=method)
             touches = [Given(requests[i].contours, *gathered(())) for i in which]
             if which:
-                answers.update(
-                    zip(which, fitted(points[which], touches, outward[which], options), strict=True)
-                )
+                results = fitted(points[which], touches, outward[which], options)
+                answers.update(zip(which, results, strict=True))
                 yield
     return [found[i] for i in range(len(steps))]
