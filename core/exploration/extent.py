@@ -156,8 +156,7 @@ class Touch:
             contours, _ = next(self._denser(*rung))
             if stops_at(contours, self.point):
                 continue
-            points = np.vstack([contour.points for contour in contours])
-            rough = roughness(points - self.point, explained)
+            rough = roughness(np.vstack([contour.points for contour in contours]) - self.point, explained)
             if rough <= ROUGH:
                 yield rung
             if rough < least:

@@ -328,12 +328,15 @@ def test_many_are_what_each_is(more):
         assert one.result.patch.k1 == pytest.approx(other.result.patch.k1, rel=1e-6)
 
 
-def test_of_many_one_may_be_no_touch():
+@pytest.mark.parametrize(
+    ("farthest", "said"), [(30.0, "point: expected one on the surface"), (None, "All curves end at once")]
+)
+def test_of_many_one_may_be_no_touch(farthest, said):
     ball = surfaces.sphere(20.0)
     points = np.array([ball.point, ball.point + 5.0 * ball.normal])
-    one, other = core.explore_many(ball, points, [ball.normal] * 2, PLANES, farthest=30.0)
+    one, other = core.explore_many(ball, points, [ball.normal] * 2, PLANES, farthest=farthest)
     assert one.result.status == "ok"
-    assert str(other).startswith("point: expected one on the surface")
+    assert str(other).startswith(said)
     assert core.explore_many(ball, np.empty((0, 3)), np.empty((0, 3)), PLANES, farthest=30.0) == []
 
 
