@@ -148,21 +148,20 @@ class Touch:
     def _in_order(self) -> Iterator[tuple[float, int]]:
         """Steps and numbers of contacts of half curves to be fitted, from long to short.
 
-        Those that end at the point, or are rough, carry no sure fit. If all do, it is the smoothest of them.
+        Those that end at the point, or are rough, hardly carry a sure fit: the smoothest of them is the last.
         """
         explained = max(self.options.noise, self.options.largest_std or 0.0)
-        smoothest, least = (self.farthest / RUNGS[0], RUNGS[0]), math.inf
+        others: list[tuple[float, tuple[float, int]]] = []
+        longest = self.farthest / RUNGS[0], RUNGS[0]
         for rung in self._rungs():
             contours, _ = next(self._denser(*rung))
-            if stops_at(contours, self.point):
-                continue
-            rough = roughness(np.vstack([contour.points for contour in contours]) - self.point, explained)
+            points = np.vstack([contour.points for contour in contours])
+            rough = math.inf if stops_at(contours, self.point) else roughness(points - self.point, explained)
             if rough <= ROUGH:
                 yield rung
-            if rough < least:
-                smoothest, least = rung, rough
-        if least > ROUGH:
-            yield smoothest
+            else:
+                others.append((rough, rung))
+        yield min(others, key=lambda other: other[0], default=(0.0, longest))[1]
 
     def _rungs(self) -> Iterator[tuple[float, int]]:
         """Steps and numbers of contacts of half curves, from long to short.

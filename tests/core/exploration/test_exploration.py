@@ -200,6 +200,19 @@ def test_next_to_an_edge_few_touches_are_tried(monkeypatch):
     assert len(results) < 10
 
 
+def test_at_the_edge_of_a_small_disk_a_touch_is_in_doubt_and_not_refused():
+    """Of every length half curves end at the point, and of the greatest ones there is no contact at all."""
+
+    class Disk:
+        def ray_cast(self, *ray):
+            hit = surfaces.plane().ray_cast(*ray)
+            return hit if hit is not None and math.hypot(hit[0][0], hit[0][1] + 1.0) <= 1.0 else None
+
+    found = explore(Disk(), (0.0, -1e-4, 0.0))
+    assert found.result.status == "uncertain"
+    assert core.stops_at(found.contours, (0.0, -1e-4, 0.0))
+
+
 def test_on_a_narrow_wall_a_touch_is_as_long_as_it_is_sure():
     """The wall is 1.4 long and .08 wide: curves that run along it do not show how it bends across."""
     wall, point = solids.block(1.0, 0.7, 0.04), (1.0, 0.1, 0.004)
