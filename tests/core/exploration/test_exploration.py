@@ -208,7 +208,8 @@ def test_at_the_edge_of_a_small_disk_a_touch_is_in_doubt_and_not_refused():
             hit = surfaces.plane().ray_cast(*ray)
             return hit if hit is not None and math.hypot(hit[0][0], hit[0][1] + 1.0) <= 1.0 else None
 
-    found = explore(Disk(), (0.0, -1e-4, 0.0))
+    planes = [core.SamplingPlane(a) for a in np.radians([30.0, 75.0, 120.0])]
+    found = explore(Disk(), (0.0, -1e-4, 0.0), planes=planes)
     assert found.result.status == "uncertain"
     assert core.stops_at(found.contours, (0.0, -1e-4, 0.0))
 
