@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Taps of the finger all over a patch: how far the surface is from it there, even without vertices.
-
-Other functions here have the verdict that follows.
-"""
+"""Taps of the finger all over a patch: how far the surface is from it, and the patch's verdict from that."""
 
 import math
 from typing import NamedTuple
