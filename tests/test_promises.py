@@ -12,7 +12,7 @@ from core.atlas import measured as atlas_measured
 from core.atlas import object_atlas, samples, touching
 from core.bayes import posterior
 from core.contours import common_point, curves, finger, thinning
-from core.exploration import extent
+from core.exploration import extent, taps
 from core.reconstruction import explained, result, status
 
 ROOT = Path(__file__).parents[1]
@@ -34,7 +34,7 @@ PROMISES = [
     ("methods", "a turn of more than #° between contacts", degrees(finger.MAX_TURN)),
     ("methods", "tilts by more than #° against the normal", degrees(finger.MAX_TILT)),
     ("methods", "fitted to the ten contacts nearest", curves.WINDOW / 10),
-    ("methods", "if one tap is off by more than five standard deviations", explained.TOO_FAR / 5),
+    ("methods", "if one tap is off by more than ten standard deviations", taps.TOO_FAR_OFF / 10),
     ("methods", "all are by more than two on average", status.CONTRADICTING / 2),
     ("methods", "if more than # % of its area has no surface", 100 * status.DOUBTFUL_GAP),
     ("methods", "At most one in a hundred contacts is off it by more than five", 100 * explained.FEW),
