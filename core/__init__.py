@@ -32,15 +32,15 @@ from .contours.finger import Surface
 from .contours.local_geometry import DegenerateCurvesError, Frame
 from .contours.tracking import track
 from .exploration.extent import Exploration
-from .exploration.mesh_error import MeshError, doubts_by_mesh, mesh_error
 from .exploration.options import ExplorationOptions
 from .exploration.side_by_side import exploring_many
+from .exploration.taps import MeshError, doubts_by_mesh, mesh_error
 from .exploration.touches import explore, explore_many
 from .paper.by_method import SOLVERS
 from .patch.domain import Domain
 from .patch.geometry import Geometry, distances, fit_error, overlapped
 from .patch.monge import MongePatch
-from .reconstruction.deviations import gaussian_curvature_stds, mean_height_stds, with_height_stds
+from .reconstruction.deviations import gaussian_curvature_stds
 from .reconstruction.from_contours import reconstruct, reconstruct_many
 from .reconstruction.next_plane import azimuth_of, suggest_plane
 from .reconstruction.options import METHODS
@@ -112,7 +112,6 @@ __all__ = [
     "gaussian_curvature_stds",
     "in_running_order",
     "is_beside_bend",
-    "mean_height_stds",
     "mesh_error",
     "open_edge_distance",
     "orientation_fault",
@@ -136,5 +135,4 @@ __all__ = [
     "verifying",
     "vertices_shown",
     "with_facets",
-    "with_height_stds",
 ]

@@ -12,7 +12,7 @@ from core.atlas import measured as atlas_measured
 from core.atlas import object_atlas, samples, touching
 from core.bayes import posterior
 from core.contours import common_point, curves, finger, thinning
-from core.exploration import extent, sampling_density, taps
+from core.exploration import extent, taps
 from core.reconstruction import explained, result, status
 
 ROOT = Path(__file__).parents[1]
@@ -34,7 +34,7 @@ PROMISES = [
     ("methods", "a turn of more than #° between contacts", degrees(finger.MAX_TURN)),
     ("methods", "tilts by more than #° against the normal", degrees(finger.MAX_TILT)),
     ("methods", "fitted to the ten contacts nearest", curves.WINDOW / 10),
-    ("methods", "off by more than ten standard deviations", taps.TOO_FAR_OFF / 10),
+    ("methods", "if one tap is off by more than ten standard deviations", taps.TOO_FAR_OFF / 10),
     ("methods", "all are by more than two on average", status.CONTRADICTING / 2),
     ("methods", "if more than # % of its area has no surface", 100 * status.DOUBTFUL_GAP),
     ("methods", "At most one in a hundred contacts is off it by more than five", 100 * explained.FEW),
@@ -43,8 +43,7 @@ PROMISES = [
     ("methods", "at most # tolerances, and contacts", touching.SIZE),
     ("methods", "left after three rounds", touching.AGAIN / 3),
     ("methods", "within # of the radius, a linear map", posterior.QUARTIC_SHARE),
-    ("viewport", "about # contacts on the longest half curve", sampling_density.CONTACTS),
-    ("viewport", "the standard deviation by less than # %", 100 * sampling_density.NOTICEABLE),
+    ("viewport", "about # contacts on the longest half curve", extent.CONTACTS),
     ("viewport", "expected to reduce the standard deviation by a tenth", 10 * extent.HELPS),
     ("viewport", "less than a twentieth of a second", 20 * of_the_add_on("probes/change_handlers", "CHEAP")),
     ("viewport", "six in all at most", of_the_add_on("touch/settings", "MOST_PLANES") / 6),

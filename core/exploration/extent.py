@@ -15,28 +15,30 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import Array
-from ..bayes.roughness import roughness
-from ..contours.contour import EXTENT, SURFACE_STOPS, UNEXPLAINED, Contour, SamplingPlane, stops_at
+from ..bayes.joint_fit import MISFIT
+from ..bayes.roughness import EXPLAINED_TERMS, roughness
+from ..contours.contour import EXTENT, UNEXPLAINED, Contour, SamplingPlane, stops_at
 from ..contours.finger import Surface
 from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.explained import are_few, too_far
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
+from ..reconstruction.status import DOUBTFUL_STD
 from .options import ExplorationOptions
-from .sampling_density import CONTACTS, DENSER, suffices
 from .taps import tapped
 
 # benchmarks.real --only automatic chose these. Half curves of these numbers of contacts are tried, from long
 # to short, then the same with half the step. Fewer give less area on scans.
 RUNGS = (16, 13, 11, 9)
 HALVINGS = 6  # The step is halved this many times. Fewer leave touches of coarse meshes in doubt.
-# Contacts smoother than SMOOTH are fitted first: with 0.006 patches of scans have a seventh less area, with
-SMOOTH = 0.0085  # more there are more fits.
-ROUGH = 0.03  # Then those up to this roughness are fitted: with SMOOTH, five of 900 more are in doubt.
-# A sure patch is off its taps by at most this share of the radius in the mean: with 0.02 one of 900 is off by
-TAPS_OFF = 0.015  # over 2 %, with 0.01 there is a seventh less area.
-# There is no surface at this share of its area at most: with 0.04 a patch spans the hole of a washer.
-LARGE_GAP = 0.02
+# Contacts up to this roughness are fitted: with 0.012 there are a quarter more fits, and one of 540 more is
+ROUGH = 0.01  # sure.
+# A sure patch is off its taps by at most this share of the radius in the mean, where a place without surface
+# is off by the radius: with 0.02 sure patches are 6 % farther off, with 0.01 they have a seventh less area.
+TAPS_OFF = 0.015
+# A half curve of a given extent has this many contacts, and any the first of these multiples that suffices
+# (benchmarks.amount of e20b52a).
+CONTACTS, DENSER = 12, (1, 2, 4)
 HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed, e20b52a).
 
 Answer = Reconstruction | DegenerateCurvesError
@@ -69,14 +71,10 @@ class Exploration:
     @property
     def reach(self) -> float:
         """The length of the longest half curve; the surface may end all before the extent."""
-        if any(stop not in SURFACE_STOPS for contour in self.contours for stop in contour.stops or ()):
-            return self.extent
-        ends = (_sides(contour, self.result.point) for contour in self.contours)
-        return self.step * max(max(sides) for sides in ends)
+        return self.step * max(max(_sides(contour, self.result.point)) for contour in self.contours)
 
 
 Steps = Generator[Request, Answer, Exploration]
-Fit = Generator[Request, Answer, Reconstruction]
 Follow = Callable[[float], list[Contour]]
 
 
@@ -104,11 +102,14 @@ class Touch:
 
     def steps(self) -> Steps:
         """The touch, with planes added while they help. They make a patch more certain, not larger."""
-        extent, tolerance = self.options.extent, self.options.tolerance
+        extent, tolerance, method = self.options.extent, self.options.tolerance, self.options.method
         if extent is None:
             found = yield from self._longest_sure()
+            if method != "bayes":
+                found = replace(found, result=(yield from _fitted(found.contours)))
         else:
-            found = self._with_taps((yield from self._felt(extent / CONTACTS, CONTACTS)))
+            found = yield from self._felt(extent / CONTACTS, CONTACTS)
+        found = self._with_taps(found)
         stds = [found.result.mean_height_std]
         while tolerance is not None and stds[-1] > tolerance and len(found.planes) < self.options.most_planes:
             plane, expected = suggest_plane(found.result, self.reference[:, 1], self.reference[:, 0])
@@ -118,8 +119,7 @@ class Touch:
                 more = yield from self._with_plane(found, plane)
             except ValueError:  # Nothing can be felt along that plane. What was felt so far stays.
                 break
-            is_in_doubt = found.result.status == "ok" != more.result.status
-            if is_in_doubt or more.result.mean_height_std >= stds[-1]:
+            if found.result.status == "ok" != more.result.status or more.result.mean_height_std >= stds[-1]:
                 break
             found = more
             stds.append(found.result.mean_height_std)
@@ -136,73 +136,55 @@ class Touch:
                 error = error or why
                 continue
             if _is_sure(found, self.options) and _is_sure(found := self._with_taps(found), self.options):
-                return (yield from self._by_method(found))
+                return found
             tried.append(found)
+            r = found.result
+            if r.mean_height_std > DOUBTFUL_STD * r.radius and not suffices(r):
+                break  # Noise leaves shorter half curves even less certain.
         if error is not None and not tried:
             raise error
-        best = min(tried, key=lambda e: (e.result.status != "ok", e.result.mean_height_std / e.result.radius))
-        return (yield from self._by_method(self._with_taps(best)))
+        return min(tried, key=lambda e: (e.result.status != "ok", e.result.mean_height_std / e.result.radius))
 
     def _in_order(self) -> Iterator[tuple[float, int]]:
-        """Steps and numbers of contacts of half curves to be fitted: smooth ones first, from long to short.
+        """Steps and numbers of contacts of half curves to be fitted, from long to short.
 
-        Those that end at the point, or are rough, carry no sure fit. If all do, it is the smoothest of them.
+        Those that end at the point, or are rough, hardly carry a sure fit: the smoothest of them is the last.
         """
+        explained = max(self.options.noise, self.options.largest_std or 0.0)
         others: list[tuple[float, tuple[float, int]]] = []
-        any_smooth = False
+        longest = self.farthest / RUNGS[0], RUNGS[0]
         for rung in self._rungs():
             contours, _ = next(self._denser(*rung))
             points = np.vstack([contour.points for contour in contours])
-            rough = roughness(points - self.point, self.options.explained)
-            if stops_at(contours, self.point):
-                rough = math.inf
-            if rough <= SMOOTH:
-                any_smooth = True
+            rough = math.inf if stops_at(contours, self.point) else roughness(points - self.point, explained)
+            if rough <= ROUGH:
                 yield rung
             else:
                 others.append((rough, rung))
-        chosen = [rung for rough, rung in others if rough <= ROUGH]
-        if not (chosen or any_smooth):
-            chosen = [
-                min(others, key=lambda other: other[0])[1] if others else (self.farthest / RUNGS[0], RUNGS[0])
-            ]
-        yield from chosen
+        yield min(others, key=lambda other: other[0], default=(0.0, longest))[1]
 
     def _rungs(self) -> Iterator[tuple[float, int]]:
         """Steps and numbers of contacts of half curves, from long to short.
 
         Half curves that the surface ends all are the same on longer rungs, which are left out.
         """
-        given = self.options.step
-        if given is not None:
-            self._followed(given, self.farthest)
-            most = self.farthest / given * (1.0 + 1e-6)
-            counts = [int(most * n / RUNGS[0] / 2.0**k) for k in range(HALVINGS + 1) for n in RUNGS]
-            yield from ((given, count) for count in dict.fromkeys(counts) if count)
-            return
         for halvings in range(HALVINGS + 1):
-            step = self.farthest / RUNGS[0] / 2.0**halvings
-            contours = self._followed(step, RUNGS[0] * step)
+            finest = self.farthest / RUNGS[0] / 2.0**halvings
+            step = self.options.step or finest
+            contours = self._followed(step, RUNGS[0] * finest)
             longest = max(max(_sides(contour, self.point)) for contour in contours)
-            for count, shorter in pairwise((*RUNGS, RUNGS[0] // 2)):
-                if longest > shorter:
-                    yield step, count
+            counts = [int(n * finest / step * (1.0 + 1e-6)) for n in (*RUNGS, RUNGS[0] // 2)]
+            yield from ((step, count) for count, shorter in pairwise(counts) if min(longest, count) > shorter)
 
     def _felt(self, step: float, count: int) -> Steps:
         """The touch with half curves of this length, and the first number of contacts that suffices."""
-        found: Exploration | DegenerateCurvesError
-        for contours, between in self._denser(step, count):
-            try:
-                r = yield from _fitted(contours, self.options.extent is None)
-            except DegenerateCurvesError as error:
-                found = error
-                continue
-            found = Exploration(contours, r, step * count, between, tuple(self.options.planes))
-            if suffices(r):
+        for contours, between in self._denser(step, count):  # noqa: B007
+            r = yield Request(contours, self.options.extent is None)
+            if isinstance(r, Reconstruction) and suffices(r):
                 break
-        if isinstance(found, DegenerateCurvesError):
-            raise found
-        return found
+        if isinstance(r, DegenerateCurvesError):
+            raise r
+        return Exploration(contours, r, step * count, between, tuple(self.options.planes))
 
     def _denser(self, step: float, count: int) -> Iterator[tuple[list[Contour], float]]:
         """Contours with half curves of `count` contacts, then more often felt, and their steps.
@@ -216,16 +198,11 @@ class Touch:
             if between == steps[-1] or self.options.extent or not stops_at(contours, self.point):
                 yield contours, between
 
-    def _by_method(self, found: Exploration) -> Steps:
-        """The touch with its fit by the method of the options."""
-        if self.options.is_bayes:
-            return found
-        return self._with_taps(replace(found, result=(yield from _fitted(found.contours))))
-
     def _with_taps(self, found: Exploration) -> Exploration:
         """The touch together with its taps."""
         r = found.result
-        if not self.options.is_tapped:
+        # A largest deviation judges the fit in place of shares of the radius.
+        if r.taps is not None or self.options.largest_std is not None:
             return found
         taps, contacts = tapped(self.surface, r, np.concatenate(self.tapped))
         self.tapped.append(contacts)
@@ -242,39 +219,46 @@ class Touch:
 
     def _cut(self, step: float, count: int) -> list[Contour]:
         """The contours of the planes with half curves of `count` contacts this step apart."""
-        contours, extent = self._followed(step, step * count), step * count
-        if self.options.extent is not None or extent >= self.farthest * (1.0 - 1e-6):
+        contours = self._followed(step, step * count)
+        if count >= int(self.farthest / step * (1.0 + 1e-6)):
             return contours
         return [_shortened(contour, self.point, count) for contour in contours]
 
     def _with_plane(self, found: Exploration, plane: SamplingPlane) -> Steps:
         """The touch with one plane more. Raises ValueError if nothing can be felt along it."""
         (more,) = self.follow((plane,), step=found.step)(found.extent)
-        if self.options.extent is None and found.extent < self.farthest:
+        if found.extent < self.farthest:
             more = _shortened(more, self.point, len(more.points))
         contours = [*found.contours, more]
         r = yield from _fitted(contours)
         return self._with_taps(replace(found, contours=contours, result=r, planes=(*found.planes, plane)))
 
 
-def _fitted(contours: list[Contour], searching: bool = False) -> Fit:
+def _fitted(contours: list[Contour]) -> Generator[Request, Answer, Reconstruction]:
     """The reconstruction of contours. Raises DegenerateCurvesError if they carry none."""
-    r = yield Request(contours, searching)
+    r = yield Request(contours)
     if isinstance(r, DegenerateCurvesError):
         raise r
     return r
 
 
+def suffices(r: Reconstruction) -> bool:
+    """Whether noise makes at most half of the mean variance of the height, which more contacts would lower.
+
+    The other half comes from directions in which these curves have no contacts. More contacts do not help
+    either if the deviation is less than any polynomial is off a surface.
+    """
+    by_noise = EXPLAINED_TERMS * float(r.posterior.noise * r.radius) ** 2 / len(r.contacts)
+    return r.mean_height_std <= MISFIT * r.radius or by_noise <= 0.5 * r.mean_height_std**2
+
+
 def _is_sure(found: Exploration, options: ExplorationOptions) -> bool:
     """Whether a touch is as certain as the options ask, and its patch explains contacts and taps."""
     r = found.result
-    if options.largest_std:
-        return r.mean_height_std <= options.largest_std and _explains(found, options)
-    if r.status != "ok":
-        return False
-    if r.taps is None:
-        return _explains(found, options)
-    return r.taps.missing <= LARGE_GAP and (r.taps.height or 0.0) <= TAPS_OFF * r.radius
+    off = 0.0 if r.taps is None else (r.taps.height or 0.0) / r.radius + r.taps.missing
+    is_ok = r.status == "ok" and off <= TAPS_OFF
+    is_certain = r.mean_height_std <= options.largest_std if options.largest_std else is_ok
+    return is_certain and _explains(found, options)
 
 
 def _explains(found: Exploration, options: ExplorationOptions) -> bool:

@@ -19,14 +19,14 @@ MOST_EVEN = 24  # At most this many planes are laid out evenly.
 
 def planes_of(planes: int | Sequence[SamplingPlane]) -> tuple[SamplingPlane, ...]:
     """This many evenly spread planes, or the planes that are given. Raises ValueError for neither."""
-    if not isinstance(planes, int | np.integer):
+    if isinstance(planes, int | np.integer):
+        is_possible = 3 <= planes <= MOST_EVEN
+        found = tuple(SamplingPlane(math.pi * i / planes) for i in range(planes)) if is_possible else ()
+    else:
         found = tuple(list_of("planes", planes, SamplingPlane))
-        if not found:
-            raise ValueError(f"planes: expected 3 to {MOST_EVEN}, or sampling planes, got none")
-        return found
-    if not 3 <= planes <= MOST_EVEN:
+    if not found:
         raise ValueError(f"planes: expected 3 to {MOST_EVEN}, or sampling planes, got {planes}")
-    return tuple(SamplingPlane(math.pi * i / planes) for i in range(planes))
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,21 +75,6 @@ class ExplorationOptions:
     def fit(self) -> FitOptions:
         """The options of the fit that is returned. The contours have their own noise."""
         return FitOptions(self.method, self.degree, None, None, self.weight, self.solver)
-
-    @property
-    def explained(self) -> float:
-        """The deviation that contacts may have: their noise, or what the patch may be off if that is more."""
-        return max(self.noise, self.largest_std or 0.0)
-
-    @property
-    def is_bayes(self) -> bool:
-        """Whether the fit that is returned is the one that the extent is chosen by."""
-        return self.method == "bayes"
-
-    @property
-    def is_tapped(self) -> bool:
-        """Whether the finger taps between the curves: only if shares of the radius judge the fit."""
-        return self.largest_std is None
 
 
 def _length(name: str, length: float | str | None) -> float | None:

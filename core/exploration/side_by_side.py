@@ -14,21 +14,15 @@ from ..arguments import LARGEST, Array, finite_array, unit_vector
 from ..contours.contour import EXTENT, Contour, SamplingPlane, Vector, along, scaled, vector_of
 from ..contours.finger import SAME_SHEET_COSINE, Surface, contact_of
 from ..contours.tracking import generator_of, track, tracker
-from ..reconstruction.deviations import with_height_stds
 from ..reconstruction.from_contours import fitted
 from ..reconstruction.options import FitOptions
-from ..reconstruction.result import Reconstruction
 from ..reconstruction.start import Given
 from ..reconstruction.strokes import gathered
-from .extent import Answer, Exploration, Request, Steps, Touch
-from .mesh_error import HAIR
+from .extent import RUNGS, Answer, Exploration, Request, Steps, Touch
 from .options import ExplorationOptions
+from .taps import HAIR
 
-GLANCE_CONTACTS = 8  # A half curve has this many contacts where it only has to show whether it ends.
 LONGEST = 1e15  # Lengths beyond this multiple of the first that is tried, or below its inverse, are not.
-# With a given deviation, as for a whole object, touches end where the cosine between successive normals is
-# below SAME_SHEET_COSINE; all others end at none.
-ANY_COSINE = -1.0
 BISECTIONS = 6  # They narrow a factor of two to a 64th of it,
 SHEET_BISECTIONS = 26  # and these so far that what they began with changes results by less than 1e-6.
 ODD = math.e  # Fractions of an object's size would end exactly on its edges, those of this multiple do not.
@@ -49,7 +43,8 @@ def exploring_many(
     up = finite_array("outward", outward, (len(p), 3))
     up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
     generator, tangent = generator_of(options.rng), options.tangent
-    cosine = SAME_SHEET_COSINE if options.largest_std else ANY_COSINE
+    # For a whole object half curves end where another sheet begins, and all others at no angle.
+    cosine = SAME_SHEET_COSINE if options.largest_std else -1.0
 
     def steps(point: Array, direction: Array) -> Steps:
         """The steps of one touch."""
@@ -85,8 +80,8 @@ def _farthest(
     """
 
     def ended(length: float) -> bool:
-        """Whether all half curves, felt coarsely, end before that, or nothing can be felt at this length."""
-        lengths = {"extent": length, "step": length / GLANCE_CONTACTS}
+        """Whether all half curves, felt with few contacts, end before that, or nothing can be felt so."""
+        lengths = {"extent": length, "step": length / RUNGS[-1]}
         try:
             contours = (contour for plane in planes for contour in track_along([plane], **lengths))
             return not any(EXTENT in (contour.stops or ()) for contour in contours)
@@ -95,23 +90,25 @@ def _farthest(
 
     # Lengths that are far shorter than the coordinates are lost to rounding.
     least, most = _bracket(ended, max(1.0, *map(abs, point)))
-    size = ODD * (_depth(surface, point, outward, least) or _bisected(ended, least, most, SHEET_BISECTIONS))
-    start = size * 2.0 ** math.ceil(math.log2(least / size))
+    depth = _depth(surface, point, outward, least)
+    if depth is None:
+        return _bisected(ended, least, most, SHEET_BISECTIONS)
+    start = ODD * depth * 2.0 ** math.ceil(math.log2(least / (ODD * depth)))
     return _bisected(ended, *_bracket(ended, start), BISECTIONS)
 
 
 def _bracket(ended: Callable[[float], bool], start: float) -> tuple[float, float]:
-    """Two lengths, one twice the other, between which all half curves end: `start` halved or doubled."""
-    least, most = (start, 2.0 * start) if not ended(start) else (0.5 * start, start)
-    while ended(least):
-        least, most = 0.5 * least, least
-        if least < 1.0 / LONGEST:
-            raise ValueError("All curves end at once, however short they are: take another point")
+    """Two lengths, one twice the other, between which all half curves end: `start` doubled or halved."""
+    most = start
     while not ended(most):
-        least, most = most, 2.0 * most
+        most *= 2.0
         if most > start * LONGEST:
             raise ValueError("The curves do not end by themselves: set farthest, the greatest length to feel")
-    return least, most
+    while ended(0.5 * most):
+        most *= 0.5
+        if most * LONGEST < start:
+            raise ValueError("All curves end at once, however short they are: take another point")
+    return 0.5 * most, most
 
 
 def _bisected(ended: Callable[[float], bool], least: float, most: float, count: int) -> float:
@@ -161,14 +158,6 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
             touches = [Given(requests[i].contours, *gathered(())) for i in which]
             if which:
                 results = fitted(points[which], touches, outward[which], options)
-                answers.update(zip(which, _with_stds(results), strict=True))
+                answers.update(zip(which, results, strict=True))
                 yield
     return [found[i] for i in range(len(steps))]
-
-
-def _with_stds(results: list[Answer]) -> list[Answer]:
-    """Results whose mean_height_std is computed for many at once."""
-    if len(results) == 1:
-        return results
-    known = iter(with_height_stds([r for r in results if isinstance(r, Reconstruction)]))
-    return [next(known) if isinstance(r, Reconstruction) else r for r in results]

@@ -12,7 +12,7 @@ from ..arguments import Array, finite_array
 from ..contours.contour import SamplingPlane, Vector, along, dot, scaled, vector_of
 from ..contours.finger import Surface, contact_of
 from ..contours.tracking import track
-from ..exploration.mesh_error import layer_height
+from ..exploration.taps import layer_height
 from ..patch.domain import GRID, Domain
 from ..patch.geometry import POINTS_AT_ONCE, Geometry, distances, fit_error, overlapped
 from ..reconstruction.result import Reconstruction

@@ -24,7 +24,6 @@ from core.bayes.posterior import DISK, QUARTIC_SHARE, nodes
 from core.bayes.prior import USUAL_WAVINESS, prior_variances
 from core.bayes.process_fit import process_posterior, touch_of
 from core.patch.monge import TERMS, exponents, monomials
-from core.reconstruction.deviations import mean_height_stds
 from core.reconstruction.next_plane import TRIED, _variance_reduction
 
 EXTENT = 12.0
@@ -270,7 +269,7 @@ def test_a_stack_of_rough_and_smooth_touches_gives_what_single_fits_give():
         x, y = over(other).T
         assert one.height(x, y) == pytest.approx(other.height(x, y), abs=1e-6)
         assert one.height_std(x, y) == pytest.approx(other.height_std(x, y), rel=1e-5, abs=1e-9)
-    assert mean_height_stds(found) == pytest.approx([r.mean_height_std for r in singles], rel=1e-5)
+    assert [r.mean_height_std for r in found] == pytest.approx([r.mean_height_std for r in singles], rel=1e-5)
 
 
 def test_more_contacts_than_places_say_as_much():

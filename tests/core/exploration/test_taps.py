@@ -12,7 +12,7 @@ import surfaces
 
 import core
 from core.exploration import extent
-from core.exploration.extent import LARGE_GAP
+from core.exploration.extent import TAPS_OFF
 from core.exploration.taps import places, tapped
 from core.reconstruction.status import DOUBTFUL_GAP, Taps
 
@@ -107,7 +107,7 @@ def test_a_sure_patch_spans_no_hole_of_a_washer(away, azimuth):
     surface, turn = Washer(15.0, 30.0), math.radians(azimuth)
     r = explore(surface, (away, 0.0, 0.0), tangent=(math.cos(turn), math.sin(turn), 0.0)).result
     assert r.status == "ok"
-    assert share_lacking(surface, r) < LARGE_GAP
+    assert share_lacking(surface, r) < 0.02
     assert r.domain.area > 200.0
 
 
@@ -151,7 +151,7 @@ def test_a_point_on_an_edge_gets_the_advice_to_move_away():
 def test_beside_an_edge_a_touch_is_so_short_that_its_curves_have_contacts_there(away):
     found = explore(Sector(None, nearest=0.0, azimuths=(0.0, 180.0)), (0.0, -away, 0.0))
     assert found.result.status == "ok"
-    assert found.result.taps.missing <= LARGE_GAP
+    assert found.result.taps.missing <= TAPS_OFF
     assert found.extent > 20.0 * away
     assert core.stops_at(found.contours, (0.0, -away, 0.0)) == []
     stops = {stop for contour in found.contours for stop in contour.stops}
@@ -181,11 +181,11 @@ def test_what_taps_of_longer_curves_have_felt_within_the_rim_counts(place, statu
 
 
 def test_a_small_hole_is_reported_and_is_no_doubt():
-    r = explore(Sector(None, nearest=16.0, farthest=20.0, azimuths=(10.0, 30.0))).result
+    r = explore(Sector(None, nearest=29.2, farthest=29.8, azimuths=(15.0, 25.0))).result
     assert r.status == "ok"
     assert r.message.startswith("The patch describes its contacts. ")
     assert r.taps.missed > 0
-    assert r.taps.missing <= LARGE_GAP
+    assert r.taps.missing <= TAPS_OFF
     assert f" At {r.taps.missed} of {r.taps.number} taps between the curves there is no surface." in r.message
 
 
@@ -204,7 +204,7 @@ SMOOTH = [surfaces.pear(), surfaces.sphere(20.0), surfaces.plane(), surfaces.tor
 
 
 def without_taps(monkeypatch):
-    monkeypatch.setattr(extent, "tapped", lambda *_: (Taps(36), np.empty((0, 3))))
+    monkeypatch.setattr(extent, "tapped", lambda *_: (Taps(96), np.empty((0, 3))))
 
 
 @pytest.mark.parametrize("surface", SMOOTH, ids=["pear", "sphere", "plane", "torus"])
@@ -216,7 +216,7 @@ def test_where_taps_agree_nothing_changes(surface, noise, monkeypatch):
     without_taps(monkeypatch)
     other = core.explore(surface, surface.point, surface.normal, rng=generators[1], **given)
     assert one.result.status == "ok"
-    assert one.result.taps[:4] == (36, 0, 0.0, 0.0)
+    assert one.result.taps[:4] == (96, 0, 0.0, 0.0)
     assert one.result.taps.height == core.mesh_error(one.result, surface).height
     without = [json.dumps(core.to_dict(replace(r, taps=None))) for r in (one.result, other.result)]
     assert without[0] == without[1]
@@ -260,7 +260,7 @@ def test_curves_that_grow_up_to_a_length_of_deviation_are_not_tapped_between():
 
 def test_planes_that_are_added_are_tapped_between():
     r = explore(Sector(-4.0, nearest=0.5), tolerance=0.0).result
-    assert r.taps.number > 36
+    assert r.taps.number > 96
 
 
 def test_taps_go_with_the_result():

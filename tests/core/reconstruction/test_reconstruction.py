@@ -22,7 +22,6 @@ from core import (
     SamplingPlane,
     common_point,
     distances,
-    mean_height_stds,
     overlapped,
     reachable,
     reconstruct,
@@ -347,7 +346,6 @@ def test_a_touch_that_carries_nothing_does_not_spoil_the_others():
     assert "three curves are needed, got 2" in str(results[1])
     assert results[0].patch.k1 == pytest.approx(-0.04, abs=1e-3)
     assert reconstruct_many(np.empty((0, 3)), [], outward=np.empty((0, 3))) == []
-    assert mean_height_stds([]) == []
 
 
 @pytest.mark.parametrize(

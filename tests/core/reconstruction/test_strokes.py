@@ -14,7 +14,6 @@ from core import (
     DegenerateCurvesError,
     SamplingPlane,
     from_dict,
-    mean_height_stds,
     reconstruct,
     reconstruct_many,
     suggest_plane,
@@ -170,7 +169,6 @@ def test_the_height_at_the_origin_is_as_uncertain_as_the_contacts_leave_it():
 def test_all_that_tells_of_the_deviation_agrees():
     r = fitted("sphere", noisy(wiped("sphere", 100), 0.2, 0), noise=0.2)
     assert r.posterior.amplitude == 0.0
-    assert mean_height_stds([r, r]) == pytest.approx([r.mean_height_std] * 2)
     flat = r.domain.grid(60)[0] / r.radius
     variances = np.diagonal(r.posterior.covariances_with(flat)(flat)[0])
     assert np.sqrt(variances) == pytest.approx(r.height_std(*(r.radius * flat).T) / r.radius)
