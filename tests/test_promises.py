@@ -40,7 +40,6 @@ PROMISES = [
     ("methods", "At most one in a hundred contacts is off it by more than five", 100 * explained.FEW),
     ("methods", "off it by more than five deviations", explained.TOO_FAR / 5),
     ("methods", "at most # % of the radius in the mean", 100 * extent.TAPS_OFF),
-    ("methods", "at most # tolerances, and contacts", touching.SIZE),
     ("methods", "left after three rounds", touching.AGAIN / 3),
     ("methods", "within # of the radius, a linear map", posterior.QUARTIC_SHARE),
     ("viewport", "about # contacts on the longest half curve", extent.CONTACTS),
