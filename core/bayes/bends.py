@@ -12,12 +12,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arguments import SMALLEST, Array
 from ..contours.contour import Contour, unit_normals
 from ..contours.local_geometry import Frame
-from ..patch.monge import TERMS, monomials
-from .prior import FREE
 
 # M bends, or two if there are fewer, show the mean curvature of a curve to the share (FEW / M)^3. Fewer than
 # FEW are those of folds or facets (benchmarks.curvatures: folds; a cylinder of 24 facets has more).
@@ -49,70 +48,104 @@ def bends_of(contours: Sequence[Contour], frame: Frame, radius: float, noise: fl
     as M = n (sum |d|)^2 / (H sum d^2 / h) bends: n if the turns of the n steps are as their lengths, and one
     if there is a single one of n even steps. Turns that noise explains count as even.
     """
-    each = [_bends(*turns) for contour in contours if (turns := _turns(contour, frame, radius, noise))]
-    x, y, turned, shares, bent, contacts = np.array(each).reshape(-1, 6).T
+    kinds = [[c for c in contours if (c.normals is None) is bare and len(c.points) > 2] for bare in (False, True)]
+    each = [_bends(_turns(kind, frame, radius, noise)) for kind in kinds if kind]
+    x, y, turned, shares, bent, contacts = np.hstack([np.empty((6, 0)), *each])
     if not turned.any():
         return Bends(np.zeros((3, 3)), 1.0, 0.0)
-    inverse = np.linalg.pinv(2.0 * monomials(np.column_stack([x, y]), TERMS[2:FREE]))
+    inverse = np.linalg.pinv(2.0 * np.array([x * x, x * y, y * y]).T)
     covariance = (inverse * (shares * bent) ** 2) @ inverse.T
     folded = float(bent[shares > 1.0].max(initial=0.0))
     return Bends(covariance, float(turned @ contacts / turned.sum()), folded)
 
 
-def _turns(
-    contour: Contour, frame: Frame, radius: float, noise: float
-) -> tuple[float, float, Array, Array, bool] | None:
-    """A curve's direction (x, y) in the tangent plane, its steps h (n,), and its turns d (n,).
+class _Turns(NamedTuple):
+    """The turns of c curves from contact to contact, m in all.
 
-    Also whether these are turns of normals, which are the same all over a facet. It is None for less than
-    three contacts, or contacts in one place.
+    toward : (c, 2), the direction of each curve in the tangent plane
+    curve : (m,), the curve of each turn
+    steps, turns : (m,), the steps h in unit radius, and the turns d in radians
+    is_felt : whether these are turns of normals, which are the same all over a facet
     """
-    local = frame.to_local(contour.points) / radius
+
+    toward: Array
+    curve: NDArray[np.intp]
+    steps: Array
+    turns: Array
+    is_felt: bool
+
+
+def _turns(contours: Sequence[Contour], frame: Frame, radius: float, noise: float) -> _Turns:
+    """The turns of curves of three contacts or more, of which all have normals or none has."""
+    sizes = np.array([len(contour.points) for contour in contours])
+    curve = np.arange(len(sizes)).repeat(sizes)
+    local = frame.to_local(np.concatenate([contour.points for contour in contours])) / radius
     reach = np.hypot(local[:, 0], local[:, 1])
-    if len(local) < 3 or reach.max() == 0.0:
-        return None
-    x, y = (local[reach.argmax(), :2] / reach.max()).tolist()
-    along = local[:, 0] * x + local[:, 1] * y
-    order = along.argsort(kind="stable")
+    farthest = np.lexsort((reach, curve))[sizes.cumsum() - 1]
+    toward = local[farthest, :2] / np.maximum(reach[farthest, None], SMALLEST)
+    ahead = toward[curve]
+    along = np.einsum("ni,ni->n", local[:, :2], ahead)
+    order = np.lexsort((along, curve))
     along = along[order]
-    if contour.normals is None:
-        return (x, y, *_turns_of_chords(along, local[order, 2], noise), False)
-    normals = unit_normals(contour.normals[order]) @ frame.axes
+    if contours[0].normals is None:
+        return _Turns(toward, *_turns_of_chords(curve, along, local[order, 2], noise), False)
+    normals = (unit_normals(np.concatenate([c.normals for c in contours])) @ frame.axes)[order]
     # Normals may be of either side.
-    across = normals[:, 0] * x + normals[:, 1] * y
-    angles = np.arctan2(np.copysign(1.0, normals[:, 2]) * across, np.abs(normals[:, 2]))
+    across = np.copysign(1.0, normals[:, 2]) * np.einsum("ni,ni->n", normals[:, :2], ahead)
+    angles = np.arctan2(across, np.abs(normals[:, 2]))
     # One contact alone that turns another way and back is an outlier.
-    before, at, after = angles[:-2], angles[1:-1], angles[2:]
-    angles[1:-1] = np.maximum(np.minimum(before, at), np.minimum(np.maximum(before, at), after))
-    steps, std = np.diff(along), math.sqrt(2.0) * (contour.normal_std or 0.0)
-    return x, y, steps, _evened(np.diff(angles), steps, np.array(std)), True
+    at = np.flatnonzero(curve[2:] == curve[:-2]) + 1
+    before, now, after = angles[at - 1], angles[at], angles[at + 1]
+    angles[at] = np.maximum(np.minimum(before, now), np.minimum(np.maximum(before, now), after))
+    stds = math.sqrt(2.0) * np.array([c.normal_std or 0.0 for c in contours])
+    first, second = _neighbors(curve)
+    curve, steps, turns = curve[second], along[second] - along[first], angles[second] - angles[first]
+    return _Turns(toward, curve, steps, _evened(curve, turns, steps, stds[curve]), True)
 
 
-def _turns_of_chords(along: Array, heights: Array, noise: float) -> tuple[Array, Array]:
-    """Steps (n,) between the middles of chords of a curve, and its turns (n,) from chord to chord."""
-    chosen = np.unique(np.linspace(0, len(along) - 1, CHORDS + 1).round().astype(np.intp))
-    lengths = np.maximum(np.diff(along[chosen]), SMALLEST)
-    turns = np.diff(np.arctan2(np.diff(heights[chosen]), lengths))
-    steps = 0.5 * (lengths[1:] + lengths[:-1])
-    return steps, _evened(turns, steps, noise * math.sqrt(6.0) / np.minimum(lengths[1:], lengths[:-1]))
+def _turns_of_chords(
+    curve: NDArray[np.intp], along: Array, heights: Array, noise: float
+) -> tuple[NDArray[np.intp], Array, Array]:
+    """The turns from chord to chord: their curves, the steps between the middles of chords, and turns, (m,)."""
+    rank, last = np.arange(len(curve)) - curve.searchsorted(curve), np.bincount(curve)[curve] - 1
+    chosen = rank * CHORDS // last > (rank - 1) * CHORDS // last
+    curve, along, heights = curve[chosen], along[chosen], heights[chosen]
+    first, second = _neighbors(curve)
+    lengths = np.maximum(along[second] - along[first], SMALLEST)
+    slopes, curve = np.arctan2(heights[second] - heights[first], lengths), curve[second]
+    first, second = _neighbors(curve)
+    turns, curve = slopes[second] - slopes[first], curve[second]
+    before, after = lengths[first], lengths[second]
+    steps, stds = 0.5 * (before + after), noise * math.sqrt(6.0) / np.minimum(before, after)
+    return curve, steps, _evened(curve, turns, steps, stds)
 
 
-def _evened(turns: Array, steps: Array, stds: Array) -> Array:
-    """The turns (n,) over steps (n,), of which those that their deviations explain follow the mean bend."""
+def _neighbors(curve: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The indices (m,) of pairs that follow each other on the same curve, among the n of `curve` in order."""
+    second = np.flatnonzero(curve[1:] == curve[:-1]) + 1
+    return second - 1, second
+
+
+def _evened(curve: NDArray[np.intp], turns: Array, steps: Array, stds: Array) -> Array:
+    """The turns (m,) over steps (m,), of which those that their deviations explain follow the mean bend."""
     if not stds.any():
         return turns
-    even = np.abs(turns - np.median(turns)) <= EXPLAINED * stds
-    mean = turns[even].sum() / max(float(steps[even].sum()), SMALLEST)
-    return np.where(even, mean * steps, turns)
+    ordered, ends = turns[np.lexsort((turns, curve))], np.bincount(curve).cumsum()
+    middle = ends + np.append(0, ends[:-1])
+    medians = 0.5 * (ordered[(middle - 1) // 2] + ordered[middle // 2])
+    even = np.abs(turns - medians[curve]) <= EXPLAINED * stds
+    means = np.bincount(curve, even * turns) / np.maximum(np.bincount(curve, even * steps), SMALLEST)
+    return np.where(even, means[curve] * steps, turns)
 
 
-def _bends(
-    x: float, y: float, steps: Array, turns: Array, is_felt: bool
-) -> tuple[float, float, float, float, float, float]:
-    """x, y, the sum of turns, the share to which they show the mean curvature, this, contacts in a bend."""
-    turned, most, length = float(np.abs(turns).sum()), len(turns), float(steps.sum())
-    if turned <= FLAT:
-        return x, y, 0.0, 0.0, 0.0, 1.0
-    bends = most * turned**2 / (length * float(turns @ (turns / np.maximum(steps, 1e-3 * length / most))))
-    share, bent = (FEW / max(bends, 2.0)) ** 3, abs(float(turns.sum())) / length
-    return x, y, turned, share, bent, max(most / bends, 1.0) if is_felt else 1.0
+def _bends(of: _Turns) -> Array:
+    """Of each of c curves x, y, the sum of turns, the share to which they show the mean curvature, this, and
+    how many contacts share a bend, (6, c)."""
+    curve, number = of.curve, np.bincount(of.curve)
+    length, turned = np.maximum(np.bincount(curve, of.steps), SMALLEST), np.bincount(curve, np.abs(of.turns))
+    squares = np.bincount(curve, of.turns**2 / np.maximum(of.steps, (1e-3 * length / number)[curve]))
+    turned[turned <= FLAT] = 0.0
+    bends = np.where(turned > 0.0, number * turned**2 / np.maximum(length * squares, 1e-300), number)
+    shares, bent = (FEW / np.maximum(bends, 2.0)) ** 3, np.abs(np.bincount(curve, of.turns)) / length
+    contacts = np.maximum(number / bends, 1.0) if of.is_felt else np.ones(len(bends))
+    return np.vstack([of.toward.T, turned, shares * (turned > 0.0), bent, contacts])
