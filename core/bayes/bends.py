@@ -23,6 +23,7 @@ from ..contours.local_geometry import Frame
 FEW = 3.0
 EXPLAINED = 5.0  # Turns that are off the median by fewer deviations are explained by noise.
 CHORDS = 24  # A curve without normals has at most this number of chords, as a touch has steps.
+RIDGE = 1e-12  # It is added to the equations of x^2, xy and y^2, because outliers may leave two curves.
 FLAT = 1e-6  # A curve whose normals turn by less, in radians, turns by rounding.
 
 
@@ -53,7 +54,8 @@ def bends_of(contours: Sequence[Contour], frame: Frame, radius: float, noise: fl
     x, y, turned, shares, bent, contacts = np.hstack([np.empty((6, 0)), *each])
     if not turned.any():
         return Bends(np.zeros((3, 3)), 1.0, 0.0)
-    inverse = np.linalg.pinv(2.0 * np.array([x * x, x * y, y * y]).T)
+    second = 2.0 * np.array([x * x, x * y, y * y])
+    inverse = np.linalg.solve(second @ second.T + RIDGE * np.eye(3), second)
     covariance = (inverse * (shares * bent) ** 2) @ inverse.T
     folded = float(bent[shares > 1.0].max(initial=0.0))
     return Bends(covariance, float(turned @ contacts / turned.sum()), folded)

@@ -256,9 +256,7 @@ class SurfacePosterior(HeightField):
 
     def curvature_std(self) -> float:
         """Standard deviation of the normal curvature at the origin, in the direction where it is largest."""
-        directions = bent()
-        covariances = directions @ self.covariance[2:FREE, 2:FREE]
-        variances = np.einsum("ni,ni->n", covariances, directions)
+        variances = normal_curvature_variances(self.covariance[2:FREE, 2:FREE])
         return math.sqrt(max(float(variances.max()), 0.0))
 
     def null_space_dimension(self, degree: int) -> int:
@@ -328,6 +326,13 @@ def bent() -> Array:
     """The second derivatives of x^2, xy and y^2 in 18 directions, (18, 3)."""
     azimuths = np.pi / 18.0 * np.arange(18)
     return 2.0 * monomials(np.column_stack([np.cos(azimuths), np.sin(azimuths)]), TERMS[2:FREE])
+
+
+def normal_curvature_variances(covariance: Array) -> Array:
+    """Variances (18,) of the derivatives of `bent`, by the covariance (3, 3) of x^2, xy and y^2."""
+    directions = bent()
+    variances: Array = np.einsum("ni,ni->n", directions @ covariance, directions)
+    return variances
 
 
 @cache

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from statistics import median
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +16,7 @@ from ..bayes.bends import Bends, bends_of
 from ..bayes.joint_fit import OUTLYING, posterior_of
 from ..bayes.near_point import curvature_contradiction
 from ..bayes.normals import contradiction, measured_normals, scatter
-from ..bayes.other_curves import contradicting_curve
+from ..bayes.other_curves import ENOUGH, contradicting_curve
 from ..bayes.posterior import SurfacePosterior, coefficients_of, terms_to
 from ..bayes.prior import FREE
 from ..contours.contour import SURFACE_ENDS, Contour, read_only, stops_at
@@ -117,7 +118,7 @@ class Reconstruction:
         points = np.vstack([*(contour.points[off] for contour, off in each), self.strokes])
         return self.frame.to_local(points)
 
-    @property
+    @cached_property
     def _off_point(self) -> list[NDArray[np.bool_]]:
         """Which contacts of each contour are not the reference point."""
         return [distances_from_point(contour.points - self._meeting)[1] for contour in self.contours]
@@ -249,9 +250,10 @@ class Reconstruction:
         """How unevenly the surface bends along the curves."""
         fitted = float(self.posterior.noise)
         noises = [fitted if c.noise is None else c.noise / self.radius for c in self.contours]
-        most = OUTLYING * fitted * self.radius
-        explained = (self._explained(c, most) if c.normals is None else c for c in self.contours)
-        return bends_of(tuple(explained), self.frame, self.radius, max(noises, default=0.0))
+        contours, most = self.contours, OUTLYING * fitted * self.radius
+        if self._departures.max() > most:
+            contours = tuple(self._explained(c, most) if c.normals is None else c for c in contours)
+        return bends_of(contours, self.frame, self.radius, max(noises, default=0.0))
 
     def _explained(self, contour: Contour, most: float) -> Contour:
         """A contour, without those contacts that are off the surface by more than this length."""
@@ -305,7 +307,7 @@ class Reconstruction:
     @property
     def typical_miss(self) -> float:
         """The median of |dz| over the contacts, which outliers do not change."""
-        return float(np.median(self._departures))
+        return median(self._departures.tolist())
 
     @cached_property
     def waves(self) -> float:
@@ -422,7 +424,7 @@ class Reconstruction:
     @cached_property
     def curve_contradiction(self) -> tuple[float, float]:
         """The number of deviations, and the share of L, by which a curve is off what the others show."""
-        if self.method != "bayes":
+        if self.method != "bayes" or len(self.contours) + (len(self.strokes) > 0) < ENOUGH:
             return 0.0, 0.0
         sizes = [int(np.count_nonzero(counted)) for counted in self._off_point]
         curve = np.repeat([*range(len(sizes)), -1], [*sizes, len(self.strokes)])
