@@ -18,7 +18,7 @@ from ..contours.contour import along, cross, dot, scaled
 from ..contours.local_geometry import UMBILIC
 from .evidence import Hyperparameters
 from .posterior import SurfacePosterior
-from .prior import FREE, USUAL_WAVINESS, prior_mean, prior_variances
+from .prior import FREE, USUAL_VARIANCES, prior_mean
 from .sextic import Sextics, mean_given, posterior_given, sextics, with_scatter
 
 # The noise is at least this share of the radius, because no surface is a polynomial. With less the waviness
@@ -82,7 +82,7 @@ def joint_fit(
     Student t distribution.
     """
     floor = np.maximum(given.noise, MISFIT)
-    usual = prior_variances(np.full(len(k1), USUAL_WAVINESS))
+    usual = USUAL_VARIANCES[None].repeat(len(k1), axis=0)
     state = _State(_first_axes(given.contacts, weights, k1, k2), k1, k2, weights, usual, floor)
     return _passes(given._replace(noise=floor), state, 0)
 
@@ -183,7 +183,7 @@ def posteriors_of(
     """
     b = len(weights)
     expected, local = prior_mean(np.full(b, k1), np.full(b, k2)), contacts[None].repeat(b, axis=0)
-    floor, usual = np.full(b, max(noise, MISFIT)), prior_variances(np.full(b, USUAL_WAVINESS))
+    floor, usual = np.full(b, max(noise, MISFIT)), USUAL_VARIANCES[None].repeat(b, axis=0)
     data = sextics(local, weights, expected, local[:, :0], point_std / floor)
     hyper = data.hyperparameters(floor) if by_evidence else Hyperparameters(usual, floor)
     return posterior_given(expected + mean_given(data, hyper), data, hyper)

@@ -118,10 +118,11 @@ class SurfacePosterior(HeightField):
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The mean height at (x, y)."""
-        z: Array = polynomial_derivatives(self.mean, TERMS, x, y, PARTIALS[:1])[0]
+        at = _rows(x, y)
+        z: Array = monomials(at, TERMS) @ self.mean
         if len(self.places):
-            z += weighted_kernel(_rows(x, y), self.places, self.variances, self.alpha).reshape(z.shape)
-        return z
+            z += weighted_kernel(at, self.places, self.variances, self.alpha)
+        return z.reshape(np.broadcast_shapes(np.shape(x), np.shape(y)))
 
     def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
         """Height, slopes and second derivatives of the mean at (x, y)."""
@@ -365,7 +366,7 @@ def nearest_quartic(mean: Array, alpha: Array, places: Array, variances: Array) 
 
 def _rows(x: ArrayLike, y: ArrayLike) -> Array:
     """Points (n, 2) of raveled x and y."""
-    return np.column_stack([np.ravel(v) for v in np.broadcast_arrays(x, y)])
+    return np.array(np.broadcast_arrays(x, y), dtype=float).reshape(2, -1).T
 
 
 @cache

@@ -98,7 +98,7 @@ def _with_processes(start: Start, fit: _Fit, posteriors: SurfacePosterior, weigh
         offset / farthest,
     )
     given = _observations(start, axes, radii, contacts)
-    turns, scales, found = process_fit(given, weights, posteriors, start.ranks(), -offset)
+    turns, scales, found = process_fit(given, weights, posteriors, start.ranks, -offset)
     contacts = contacts @ turns / scales[:, None, None]
     return _Fit(points, axes @ turns, radii * scales, contacts, fit.degrees, found)
 

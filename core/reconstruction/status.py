@@ -156,10 +156,10 @@ def _flat_share(contours: Sequence[Contour], origin: Array) -> float:
     for contour in contours:
         if contour.normals is None:
             continue
-        at = int(np.argmin(np.linalg.norm(contour.points - origin, axis=1)))
-        normals = unit_normals(contour.normals)
-        turns = np.abs(normals @ normals[at]) < FLAT_COSINE
+        r, normals = contour.points - origin, unit_normals(contour.normals)
+        at = int(np.einsum("ni,ni->n", r, r).argmin())
+        turns = (np.abs(normals @ normals[at]) < FLAT_COSINE).tolist()
         for half in (turns[:at][::-1], turns[at + 1 :]):
-            flat += int(np.argmax(np.append(half, True)))
+            flat += [*half, True].index(True)
             number += len(half)
     return flat / max(number, 1)
