@@ -70,13 +70,14 @@ def process_fit(
     given: Observations,
     weights: Array,
     posterior: SurfacePosterior,
+    residuals: Array,
     ranks: Callable[[int], NDArray[np.intp]],
     offsets: Array,
 ) -> tuple[Array, Array, list[SurfacePosterior]]:
     """The fits of b touches, with a process where the evidence favors one, and unchanged elsewhere.
 
     given : in the Darboux frames of the sextics, whose posteriors are a stack
-    weights : (b, n), 0 where there is no contact
+    weights : (b, n), 0 where there is no contact; residuals : (b, n), those of the sextics
     ranks : gives those (n,) of a touch's contacts on each half of a curve, from the rim, and of strokes
     offsets : (b,), the height of the reference point above the origin
 
@@ -85,7 +86,7 @@ def process_fit(
     """
     b, least = len(weights), np.maximum(given.noise, PROCESS_MISFIT)
     turns, scales, found = np.eye(3)[None].repeat(b, axis=0), np.ones(b), [posterior.at(i) for i in range(b)]
-    off, most = np.abs(posterior.residuals(given.contacts)), np.maximum(posterior.noise, least)
+    off, most = np.abs(residuals), np.maximum(posterior.noise, least)
     rms = np.sqrt((weights * off**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0))
     for i in np.flatnonzero(rms > UNEXPLAINED_MISFIT * least):
         there = np.flatnonzero(weights[i])

@@ -81,26 +81,21 @@ def _fit(start: Start, options: FitOptions) -> _Fit:
 def _with_processes(start: Start, fit: _Fit, posteriors: SurfacePosterior, weights: Array) -> _Fit:
     """The joint fit in unit radius; where evidence favors a process, with it and in its frame."""
     points, axes, radii, contacts = fit[:4]
-    offset = np.zeros(len(points))
-    if start.point_stds.any():
-        given = _observations(start, axes, start.radii, contacts)
-        offset = (weights * posteriors.residuals(contacts)).sum(axis=1) / weights.sum(axis=1)
-        offset *= offset_share(weights, given.point_std / np.maximum(given.noise, MISFIT))
-        contacts[..., 2] -= offset[:, None]
-        points = points + (radii * offset)[:, None] * axes[..., 2]
+    given, residuals = _observations(start, axes, radii, contacts), posteriors.residuals(contacts)
+    offset = (weights * residuals).sum(axis=1) / weights.sum(axis=1)
+    offset *= offset_share(weights, given.point_std / np.maximum(given.noise, MISFIT))
+    contacts[..., 2] -= offset[:, None]
+    points = points + (radii * offset)[:, None] * axes[..., 2]
     # The radius is the distance of the farthest contact of curves, or of strokes where there are no curves.
     places = contacts.shape[1] if start.strokes_only else start.curves.present[0].size
     farthest = np.hypot(contacts[..., 0], contacts[..., 1])[:, :places].max(axis=1)
-    radii, contacts, posteriors, offset = (
-        radii * farthest,
-        contacts / farthest[:, None, None],
-        posteriors.scaled(1.0 / farthest),
-        offset / farthest,
-    )
-    given = _observations(start, axes, radii, contacts)
-    turns, scales, found = process_fit(given, weights, posteriors, start.ranks, -offset)
+    contacts, offset = contacts / farthest[:, None, None], offset / farthest
+    stds = given.noise / farthest, given.noise_is_known, given.point_std / farthest
+    given = Observations(contacts, *given[1:3], *stds)
+    residuals, posteriors = residuals / farthest[:, None] - offset[:, None], posteriors.scaled(1.0 / farthest)
+    turns, scales, found = process_fit(given, weights, posteriors, residuals, start.ranks, -offset)
     contacts = contacts @ turns / scales[:, None, None]
-    return _Fit(points, axes @ turns, radii * scales, contacts, fit.degrees, found)
+    return _Fit(points, axes @ turns, radii * farthest * scales, contacts, fit.degrees, found)
 
 
 def _observations(start: Start, axes: Array, radii: Array, contacts: Array) -> Observations:
