@@ -237,13 +237,14 @@ class Reconstruction:
             off = posterior.polynomial[2:FREE] - coefficients_of(self.patch.scaled(1.0 / self.radius))[2:FREE]
             found = found + np.outer(off, off)
         # One deviation in each direction: that of the coefficient of xy is larger by the square root of 2.
-        facets = (0.5 * self.radius * self._off_shape.max(initial=0.0)) ** 2 * np.diag([1.0, 2.0, 1.0])
+        facets = (0.5 * self.radius * max(self._off_shape, default=0.0)) ** 2 * np.diag([1.0, 2.0, 1.0])
         return found + self.bends.covariance + facets
 
     @property
-    def _off_shape(self) -> Array:
-        """How far principal curvatures are off each estimate of those of the shape, (n,)."""
-        return np.abs(np.sort([self.k1, self.k2]) - self.shape_curvatures).max(axis=1)
+    def _off_shape(self) -> list[float]:
+        """How far principal curvatures are off each estimate of those of the shape."""
+        low, high = sorted((self.k1, self.k2))
+        return [max(abs(low - k1), abs(high - k2)) for k1, k2 in self.shape_curvatures.tolist()]
 
     @cached_property
     def bends(self) -> Bends:

@@ -83,16 +83,16 @@ def about_taps(taps: Taps | None, is_at_edge: bool, useless: tuple[str, ...]) ->
     yield from beyond("gap", taps.missing, DOUBTFUL_GAP, useless)
 
 
-def about_facets(off: Array, shape: Array) -> Iterator[Doubt]:
+def about_facets(off: Sequence[float], shape: Array) -> Iterator[Doubt]:
     """Whether few facets have other principal curvatures than the shape that they stand for.
 
-    off : (n,), how far those found are off estimates of the shape's; shape : (n, 2), these
+    off : n numbers, how far those found are off estimates of the shape's; shape : (n, 2), these
     """
-    if not len(shape):
+    if not off:
         return
     largest, apart = float(np.abs(shape).max()), float(np.ptp(shape, axis=0).max())
-    if off.min() > max(OFF_SHAPE * largest, DISAGREEING * apart):
-        yield Doubt("facets", float(off.max()) / largest, OFF_SHAPE)
+    if min(off) > max(OFF_SHAPE * largest, DISAGREEING * apart):
+        yield Doubt("facets", max(off) / largest, OFF_SHAPE)
 
 
 def about_point(
