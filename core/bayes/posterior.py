@@ -105,10 +105,6 @@ class SurfacePosterior(HeightField):
         root[..., :-1] = root[..., :-1] @ np.swapaxes(turn, -1, -2)
         return replace(self, mean=(turn @ self.mean[..., None])[..., 0], root=root)
 
-    def residuals(self, contacts: Array) -> Array:
-        """The heights (b, n) of contacts (b, n, 3) above b polynomials."""
-        return contacts[..., 2] - (monomials(contacts, TERMS) @ self.mean[..., None])[..., 0]
-
     # What follows is for a single posterior, not for a stack.
 
     @property
@@ -214,9 +210,11 @@ class SurfacePosterior(HeightField):
         a = _truncation(degree) @ self.polynomial[FREE:]
         return MongePatch(2.0 * float(self.polynomial[2]), 2.0 * float(self.polynomial[4]), a)
 
-    def degree_shown(self, contacts: Array) -> int:
-        """The least degree whose patch is off the mean by at most half its deviation at contacts (n, 3)."""
-        basis = monomials(contacts, TERMS)
+    def degree_shown(self, basis: Array) -> int:
+        """The least degree whose patch is off the mean by at most half its deviation at contacts.
+
+        basis : (n, 27), the terms there
+        """
         left = basis @ self.root[:, :-1].T
         variance = np.einsum("ni,ni->", left, left)
         off = basis[:, FREE:] @ (_departures() @ self.polynomial[FREE:]).T

@@ -19,7 +19,7 @@ from ..contours.local_geometry import DegenerateCurvesError, Frame
 from ..paper.by_method import coefficients
 from ..patch.domain import Domain, hull_domain
 from ..patch.geometry import Geometry
-from ..patch.monge import HeightField, MongePatch
+from ..patch.monge import TERMS, HeightField, MongePatch, monomials
 from .options import FitOptions
 from .result import Reconstruction
 from .start import Given, Start, away_from, curves_start, domain_of, strokes_start
@@ -61,27 +61,33 @@ def _fit(start: Start, options: FitOptions) -> _Fit:
     if options.method != "bayes" and options.degree != "auto":
         return plain
     given = _observations(start, start.axes, start.radii, contacts)
+    weights = present.astype(float)
     # Short curves are filled up to the length of the longest, and fitting that too would take time.
-    kept = np.argsort(~present, axis=1, kind="stable")[:, : present.sum(axis=1).max()]
-    weights, rows = present.astype(float), np.arange(len(kept))[:, None]
-    normals = given.normals[rows, kept] if given.normals.size else given.normals
-    given = given._replace(contacts=contacts[rows, kept], normals=normals)
-    k1, k2 = start.kappas.T
-    turns, posteriors, found = joint_fit(given, weights[rows, kept], k1, k2)
-    weights[rows, kept] = found
+    kept = np.arange(len(weights))[:, None], np.argsort(~present, axis=1, kind="stable")
+    kept = kept[0], kept[1][:, : present.sum(axis=1).max()]
+    normals = given.normals[kept] if given.normals.size else given.normals
+    given = given._replace(contacts=contacts[kept], normals=normals)
+    turns, posteriors, weights[kept] = joint_fit(given, weights[kept], *start.kappas.T)
     local = contacts @ turns
+    basis = monomials(local, TERMS)
     if options.degree == "auto":
-        degrees = [posteriors.at(i).degree_shown(local[i][present[i]]) for i in range(len(degrees))]
+        degrees = [posteriors.at(i).degree_shown(basis[i, present[i]]) for i in range(len(degrees))]
     if options.method != "bayes":
         return plain._replace(degrees=degrees)
     joint = plain._replace(axes=start.axes @ turns, contacts=local, degrees=degrees)
-    return _with_processes(start, joint, posteriors, weights)
+    residuals = local[..., 2] - (basis @ posteriors.mean[..., None])[..., 0]
+    return _with_processes(start, joint, posteriors, weights, residuals)
 
 
-def _with_processes(start: Start, fit: _Fit, posteriors: SurfacePosterior, weights: Array) -> _Fit:
-    """The joint fit in unit radius; where evidence favors a process, with it and in its frame."""
+def _with_processes(
+    start: Start, fit: _Fit, posteriors: SurfacePosterior, weights: Array, residuals: Array
+) -> _Fit:
+    """The joint fit in unit radius; where evidence favors a process, with it and in its frame.
+
+    weights, residuals : (b, n), of the contacts
+    """
     points, axes, radii, contacts = fit[:4]
-    given, residuals = _observations(start, axes, radii, contacts), posteriors.residuals(contacts)
+    given = _observations(start, axes, radii, contacts)
     offset = (weights * residuals).sum(axis=1) / weights.sum(axis=1)
     offset *= offset_share(weights, given.point_std / np.maximum(given.noise, MISFIT))
     contacts[..., 2] -= offset[:, None]
