@@ -51,7 +51,7 @@ def bends_of(contours: Sequence[Contour], frame: Frame, radius: float, noise: fl
     """
     kinds = [[c for c in contours if (c.normals is None) is bare and len(c.points) > 2] for bare in (False, True)]
     each = [_bends(_turns(kind, frame, radius, noise)) for kind in kinds if kind]
-    x, y, turned, shares, bent, contacts = np.hstack([np.empty((6, 0)), *each])
+    x, y, turned, shares, bent, contacts = np.concatenate([np.empty((6, 0)), *each], axis=1)
     if not turned.any():
         return Bends(np.zeros((3, 3)), 1.0, 0.0)
     second = 2.0 * np.array([x * x, x * y, y * y])
@@ -96,7 +96,7 @@ def _turns(contours: Sequence[Contour], frame: Frame, radius: float, noise: floa
     across = np.copysign(1.0, normals[:, 2]) * np.einsum("ni,ni->n", normals[:, :2], ahead)
     angles = np.arctan2(across, np.abs(normals[:, 2]))
     # One contact alone that turns another way and back is an outlier.
-    at = np.flatnonzero(curve[2:] == curve[:-2]) + 1
+    at = (curve[2:] == curve[:-2]).nonzero()[0] + 1
     before, now, after = angles[at - 1], angles[at], angles[at + 1]
     angles[at] = np.maximum(np.minimum(before, now), np.minimum(np.maximum(before, now), after))
     stds = math.sqrt(2.0) * np.array([c.normal_std or 0.0 for c in contours])
@@ -124,7 +124,7 @@ def _turns_of_chords(
 
 def _neighbors(curve: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """The indices (m,) of pairs that follow each other on the same curve, among the n of `curve` in order."""
-    second = np.flatnonzero(curve[1:] == curve[:-1]) + 1
+    second = (curve[1:] == curve[:-1]).nonzero()[0] + 1
     return second - 1, second
 
 
@@ -150,4 +150,4 @@ def _bends(of: _Turns) -> Array:
     bends = np.where(turned > 0.0, number * turned**2 / np.maximum(length * squares, 1e-300), number)
     shares, bent = (FEW / np.maximum(bends, 2.0)) ** 3, np.abs(np.bincount(curve, of.turns)) / length
     contacts = np.maximum(number / bends, 1.0) if of.is_felt else np.ones(len(bends))
-    return np.vstack([of.toward.T, turned, shares * (turned > 0.0), bent, contacts])
+    return np.array([*of.toward.T, turned, shares * (turned > 0.0), bent, contacts])

@@ -218,7 +218,7 @@ class SurfacePosterior(HeightField):
         left = basis @ self.root[:, :-1].T
         variance = np.einsum("ni,ni->", left, left)
         off = basis[:, FREE:] @ (_departures() @ self.polynomial[FREE:]).T
-        enough = np.flatnonzero(np.einsum("nk,nk->k", off, off) <= 0.25 * variance)
+        enough = (np.einsum("nk,nk->k", off, off) <= 0.25 * variance).nonzero()[0]
         return LEAST_DEGREE + int(enough[0]) if len(enough) else DEGREE
 
     def turn(self, confidence: float = CONFIDENCE) -> float:

@@ -115,7 +115,7 @@ class Reconstruction:
     def contacts(self) -> Array:
         """The fitted contacts besides the reference point, (n, 3), in the frame."""
         each = zip(self.contours, self._off_point, strict=True)
-        points = np.vstack([*(contour.points[off] for contour, off in each), self.strokes])
+        points = np.concatenate([*(contour.points[off] for contour, off in each), self.strokes])
         return self.frame.to_local(points)
 
     @cached_property

@@ -261,7 +261,7 @@ def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
 
     If the surface ended before the first contact of a side, it ends at the point.
     """
-    last = np.maximum(np.count_nonzero(curves.present, axis=1) - 1, 0)
+    last = np.maximum(curves.present.sum(axis=1) - 1, 0)
     rows, ahead = np.arange(len(last)), curves.tangents[:, :2]
     there = curves.present[:, 0]
     sides = np.array([there & (curves.along[:, 0] < 0.0), there & (curves.along[rows, last] > 0.0)])
