@@ -126,3 +126,9 @@ def test_facets_around_a_cylinder_are_bends_enough(sections):
     r = core.explore(Prism(), point, normals[0], farthest=1.5).result
     assert r.status == "ok"
     assert (r.k1, r.k2) == pytest.approx((-1.0, 0.0), abs=0.15)
+
+
+def test_few_bends_also_widen_the_deviation_of_gaussian_curvature_along_the_patch():
+    for r in touches(5, 4, 0, extent=0.6):
+        (std,) = core.gaussian_curvature_stds(r, np.zeros(1), np.zeros(1))
+        assert 0.9 < std / r.gaussian_curvature_std < 1.6  # That of z_xy counts as well.
