@@ -404,7 +404,7 @@ class Reconstruction:
         if status.is_on_flat_face(bent, std, self.contours, self.frame.origin):
             yield Doubt("flat_face", bent, std, useless=useless)
         yield from beyond("folds", self.bends.folded, status.DOUBTFUL_FOLD, useless)
-        yield from beyond("bend", self.curvature_contradiction, status.SIGNIFICANT, useless)
+        yield from beyond("bend", self.curvature_contradiction, status.DOUBTFUL_BEND, useless)
 
     @property
     def _notes(self) -> str:
@@ -436,7 +436,8 @@ class Reconstruction:
     @cached_property
     def curvature_contradiction(self) -> float:
         """The number of deviations by which curvatures are off those of the contacts near the point."""
-        return curvature_contradiction(self.contacts / self.radius, self.posterior, self.curvature_covariance)
+        contacts, covariance = self.contacts / self.radius, self.curvature_covariance
+        return curvature_contradiction(contacts, self.posterior, covariance, self.bends.contacts)
 
     @cached_property
     def _fitted_normals(self) -> tuple[Array, Array]:
