@@ -18,9 +18,10 @@ from ..arguments import SMALLEST, Array
 from ..contours.contour import Contour, unit_normals
 from ..contours.local_geometry import Frame
 
-# M bends, or two if there are fewer, show the mean curvature of a curve to the share (FEW / M)^3. Fewer than
-# FEW are those of folds or facets (benchmarks.curvatures: folds; a cylinder of 24 facets has more).
-FEW = 3.0
+# M bends, or LEAST if there are fewer, show a curvature to the share (FEW / M)^3. Fewer than FEW are those of
+# folds or facets (benchmarks.curvatures: folds, tips of cones; a cylinder of 24 facets has more). With 3 and
+# 2, curvatures across folds without normals are off by over five deviations.
+FEW, LEAST = 3.5, 3.0
 EXPLAINED = 5.0  # Turns that are off the median by fewer deviations are explained by noise.
 CHORDS = 24  # A curve without normals has at most this number of chords, as a touch has steps.
 RIDGE = 1e-12  # It is added to the equations of x^2, xy and y^2, because outliers may leave two curves.
@@ -40,24 +41,28 @@ class Bends(NamedTuple):
     folded: float
 
 
-def bends_of(contours: Sequence[Contour], frame: Frame, radius: float, noise: float) -> Bends:
+def bends_of(contours: Sequence[Contour], frame: Frame, radius: float, noise: float, terms: Array) -> Bends:
     """The bends along contours, by their normals or else by the chords between their contacts.
 
     noise : of a contact without normals, in unit radius
+    terms : (3,), the patch's coefficients of x^2, xy and y^2 in unit radius
 
-    Along a curve, the surface turns by d over each step h from contact to contact. With H = sum h these count
+    Bends show the mean curvature along a curve or, if it is larger, that of the patch. Along a curve, the surface turns by d over each step h from contact to contact. With H = sum h these count
     as M = n (sum |d|)^2 / (H sum d^2 / h) bends: n if the turns of the n steps are as their lengths, and one
     if there is a single one of n even steps. Turns that noise explains count as even.
     """
-    kinds = [[c for c in contours if (c.normals is None) is bare and len(c.points) > 2] for bare in (False, True)]
+    kinds = [
+        [c for c in contours if (c.normals is None) is bare and len(c.points) > 2] for bare in (False, True)
+    ]
     each = [_bends(_turns(kind, frame, radius, noise)) for kind in kinds if kind]
     x, y, turned, shares, bent, contacts = np.concatenate([np.empty((6, 0)), *each], axis=1)
     if not turned.any():
         return Bends(np.zeros((3, 3)), 1.0, 0.0)
     second = 2.0 * np.array([x * x, x * y, y * y])
     inverse = np.linalg.solve(second @ second.T + RIDGE * np.eye(3), second)
-    covariance = (inverse * (shares * bent) ** 2) @ inverse.T
     folded = float(bent[shares > 1.0].max(initial=0.0))
+    bent = np.maximum(bent, np.abs(terms @ second))
+    covariance = (inverse * (shares * bent) ** 2) @ inverse.T
     return Bends(covariance, float(turned @ contacts / turned.sum()), folded)
 
 
@@ -148,6 +153,6 @@ def _bends(of: _Turns) -> Array:
     squares = np.bincount(curve, of.turns**2 / np.maximum(of.steps, (1e-3 * length / number)[curve]))
     turned[turned <= FLAT] = 0.0
     bends = np.where(turned > 0.0, number * turned**2 / np.maximum(length * squares, 1e-300), number)
-    shares, bent = (FEW / np.maximum(bends, 2.0)) ** 3, np.abs(np.bincount(curve, of.turns)) / length
+    shares, bent = (FEW / np.maximum(bends, LEAST)) ** 3, np.abs(np.bincount(curve, of.turns)) / length
     contacts = np.maximum(number / bends, 1.0) if of.is_felt else np.ones(len(bends))
     return np.array([*of.toward.T, turned, shares * (turned > 0.0), bent, contacts])

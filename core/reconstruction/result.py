@@ -254,7 +254,8 @@ class Reconstruction:
         contours, most = self.contours, OUTLYING * fitted * self.radius
         if self._departures.max() > most:
             contours = tuple(self._explained(c, most) if c.normals is None else c for c in contours)
-        return bends_of(contours, self.frame, self.radius, max(noises, default=0.0))
+        noise, terms = max(noises, default=0.0), self.posterior.polynomial[2:FREE]
+        return bends_of(contours, self.frame, self.radius, noise, terms)
 
     def _explained(self, contour: Contour, most: float) -> Contour:
         """A contour, without those contacts that are off the surface by more than this length."""

@@ -10,7 +10,7 @@ import pytest
 import surfaces
 
 import core
-from core.bayes.bends import FEW, bends_of
+from core.bayes.bends import FEW, LEAST, bends_of
 
 TOP = 0.2
 
@@ -72,7 +72,7 @@ def contour(angles, steps):
 def bends(given):
     frame = core.Frame(np.zeros(3), np.eye(3))
     across = [core.Contour(c.points[:, [1, 0, 2]], normals=c.normals[:, [1, 0, 2]]) for c in given]
-    return bends_of([*given, *across], frame, 0.5 * np.ptp(given[0].points[:, 0]), 0.0)
+    return bends_of([*given, *across], frame, 0.5 * np.ptp(given[0].points[:, 0]), 0.0, np.zeros(3))
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -91,7 +91,7 @@ def test_a_single_fold_is_one_bend_whatever_length_and_side_normals_have(scale):
     turned = replace(turned, normals=scale * turned.normals)
     assert found.folded == pytest.approx(0.1)  # 0.2 radians over 2 L
     assert bends([turned]).covariance == pytest.approx(found.covariance)
-    wanted = (FEW / 2.0) ** 3 * 0.1  # There are two bends at least.
+    wanted = (FEW / LEAST) ** 3 * 0.1
     assert 2.0 * math.sqrt(found.covariance[0, 0]) == pytest.approx(wanted, rel=1e-6)
 
 
