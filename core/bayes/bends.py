@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import SMALLEST, Array
-from ..contours.contour import Contour, unit_normals
+from ..contours.contour import Contour
 from ..contours.local_geometry import Frame
 
 # M bends, or LEAST if there are fewer, show a curvature to the share (FEW / M)^3. Fewer than FEW are those of
@@ -96,8 +96,9 @@ def _turns(contours: Sequence[Contour], frame: Frame, radius: float, noise: floa
     along = along[order]
     if contours[0].normals is None:
         return _Turns(toward, *_turns_of_chords(curve, along, local[order, 2], noise), False)
-    normals = (unit_normals(np.concatenate([c.normals for c in contours])) @ frame.axes)[order]
-    # Normals may be of either side.
+    normals = np.concatenate([c.normals for c in contours])[order]
+    # Normals may be of either side and any length, but products of large ones have to be finite.
+    normals = normals / max(float(np.abs(normals).max()), 1e-300) @ frame.axes
     across = np.copysign(1.0, normals[:, 2]) * np.einsum("ni,ni->n", normals[:, :2], ahead)
     angles = np.arctan2(across, np.abs(normals[:, 2]))
     # One contact alone that turns another way and back is an outlier.

@@ -129,7 +129,11 @@ class SurfacePosterior(HeightField):
 
     def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Standard deviations of the height at n points, (n,)."""
-        known, left = self._whitened(_rows(x, y))
+        at = _rows(x, y)
+        if not len(self.places):
+            left = monomials(at, TERMS) @ self.root[:, :-1].T + self.root[:, -1]
+            return np.sqrt(np.einsum("ni,ni->n", left, left))
+        known, left = self._whitened(at)
         variance = np.einsum("in,in->n", left, left) - np.einsum("in,in->n", known, known)
         return np.sqrt(np.maximum(self.variances.sum() + variance, 0.0))
 

@@ -154,14 +154,11 @@ def is_on_flat_face(bent: float, std: float, contours: Sequence[Contour], origin
 
 def _flat_share(contours: Sequence[Contour], origin: Array) -> float:
     """The share of contacts with the normal at the point, on each half curve up to the first other one."""
-    flat = number = 0
-    for contour in contours:
-        if contour.normals is None:
-            continue
-        r, normals = contour.points - origin, unit_normals(contour.normals)
+    felt = [(contour.points, contour.normals) for contour in contours if contour.normals is not None]
+    units, flat, start = unit_normals(np.concatenate([np.empty((0, 3)), *(n for _, n in felt)])), 0, 0
+    for points, _ in felt:
+        r, normals, start = points - origin, units[start : start + len(points)], start + len(points)
         at = int(np.einsum("ni,ni->n", r, r).argmin())
         turns = (np.abs(normals @ normals[at]) < FLAT_COSINE).tolist()
-        for half in (turns[:at][::-1], turns[at + 1 :]):
-            flat += [*half, True].index(True)
-            number += len(half)
-    return flat / max(number, 1)
+        flat += sum([*half, True].index(True) for half in (turns[:at][::-1], turns[at + 1 :]))
+    return flat / max(len(units) - len(felt), 1)
