@@ -47,9 +47,10 @@ def bends_of(contours: Sequence[Contour], frame: Frame, radius: float, noise: fl
     noise : of a contact without normals, in unit radius
     terms : (3,), the patch's coefficients of x^2, xy and y^2 in unit radius
 
-    Bends show the mean curvature along a curve or, if it is larger, that of the patch. Along a curve, the surface turns by d over each step h from contact to contact. With H = sum h these count
+    Along a curve, the surface turns by d over each step h from contact to contact. With H = sum h these count
     as M = n (sum |d|)^2 / (H sum d^2 / h) bends: n if the turns of the n steps are as their lengths, and one
-    if there is a single one of n even steps. Turns that noise explains count as even.
+    if there is a single one of n even steps. Turns that noise explains count as even. What these show is the
+    mean curvature of the curve or, if that is larger, the curvature of the patch.
     """
     kinds = [
         [c for c in contours if (c.normals is None) is bare and len(c.points) > 2] for bare in (False, True)
@@ -114,10 +115,12 @@ def _turns(contours: Sequence[Contour], frame: Frame, radius: float, noise: floa
 def _turns_of_chords(
     curve: NDArray[np.intp], along: Array, heights: Array, noise: float
 ) -> tuple[NDArray[np.intp], Array, Array]:
-    """The turns from chord to chord: their curves, the steps between the middles of chords, and turns, (m,)."""
-    rank, last = np.arange(len(curve)) - curve.searchsorted(curve), np.bincount(curve)[curve] - 1
-    chosen = rank * CHORDS // last > (rank - 1) * CHORDS // last
-    curve, along, heights = curve[chosen], along[chosen], heights[chosen]
+    """The curves (m,) of the turns from chord to chord, the steps (m,) between middles, and the turns (m,)."""
+    last = np.bincount(curve) - 1
+    if last.max() > CHORDS:
+        rank, last = np.arange(len(curve)) - curve.searchsorted(curve), last[curve]
+        chosen = rank * CHORDS // last > (rank - 1) * CHORDS // last
+        curve, along, heights = curve[chosen], along[chosen], heights[chosen]
     first, second = _neighbors(curve)
     lengths = np.maximum(along[second] - along[first], SMALLEST)
     slopes, curve = np.arctan2(heights[second] - heights[first], lengths), curve[second]
@@ -147,8 +150,10 @@ def _evened(curve: NDArray[np.intp], turns: Array, steps: Array, stds: Array) ->
 
 
 def _bends(of: _Turns) -> Array:
-    """Of each of c curves x, y, the sum of turns, the share to which they show the mean curvature, this, and
-    how many contacts share a bend, (6, c)."""
+    """What c curves show, (6, c): x and y, the sum of turns, a share, the mean curvature, contacts in a bend.
+
+    The share is that to which the bends show a curvature.
+    """
     curve, number = of.curve, np.bincount(of.curve)
     length, turned = np.maximum(np.bincount(curve, of.steps), SMALLEST), np.bincount(curve, np.abs(of.turns))
     squares = np.bincount(curve, of.turns**2 / np.maximum(of.steps, (1e-3 * length / number)[curve]))

@@ -56,8 +56,9 @@ def _mean_stds_of_sextics(results: Sequence[Reconstruction]) -> list[float]:
 def gaussian_curvature_stds(r: Reconstruction, x: Array, y: Array) -> Array:
     """Standard deviations (m,) of K of a patch's polynomial at local x and y, (m,) each, in 1/length^2.
 
-    Few bends widen them as they do those of curvatures at the point. They follow from the gradient of K in the coefficients and, since that does not suffice at a rim, from
-    the second-order variance of z_xx z_yy - z_xy^2 for normally distributed second derivatives.
+    They follow from the gradient of K in the coefficients and, since that does not suffice at a rim, from
+    the second-order variance of z_xx z_yy - z_xy^2 for normally distributed second derivatives. Few bends
+    widen them as they do those of curvatures at the point.
     """
     by = derived_monomials(np.stack([x, y], axis=-1) / r.radius, TERMS, PARTIALS[1:])
     derivatives, covariance = by @ r.posterior.polynomial, r.posterior.covariance.copy()

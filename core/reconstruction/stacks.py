@@ -4,7 +4,7 @@
 
 from collections.abc import Sequence
 from itertools import count
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -62,9 +62,11 @@ def _fit(start: Start, options: FitOptions) -> _Fit:
         return plain
     given = _observations(start, start.axes, start.radii, contacts)
     weights = present.astype(float)
-    # Short curves are filled up to the length of the longest, and fitting that too would take time.
-    kept = np.arange(len(weights))[:, None], np.argsort(~present, axis=1, kind="stable")
-    kept = kept[0], kept[1][:, : present.sum(axis=1).max()]
+    kept: tuple[Any, Any] = slice(None), slice(None)
+    if not present.all():
+        # Short curves are filled up to the length of the longest, and fitting that too would take time.
+        first = np.argsort(~present, axis=1, kind="stable")[:, : present.sum(axis=1).max()]
+        kept = np.arange(len(weights))[:, None], first
     normals = given.normals[kept] if given.normals.size else given.normals
     given = given._replace(contacts=contacts[kept], normals=normals)
     turns, posteriors, weights[kept] = joint_fit(given, weights[kept], *start.kappas.T)
@@ -96,8 +98,8 @@ def _with_processes(
     places = contacts.shape[1] if start.strokes_only else start.curves.present[0].size
     farthest = np.hypot(contacts[..., 0], contacts[..., 1])[:, :places].max(axis=1)
     contacts, offset = contacts / farthest[:, None, None], offset / farthest
-    stds = given.noise / farthest, given.noise_is_known, given.point_std / farthest
-    given = Observations(contacts, *given[1:3], *stds)
+    stds = {"noise": given.noise / farthest, "point_std": given.point_std / farthest}
+    given = given._replace(contacts=contacts, **stds)
     residuals, posteriors = residuals / farthest[:, None] - offset[:, None], posteriors.scaled(1.0 / farthest)
     turns, scales, found = process_fit(given, weights, posteriors, residuals, start.ranks, -offset)
     contacts = contacts @ turns / scales[:, None, None]
