@@ -115,7 +115,7 @@ def _turns(contours: Sequence[Contour], frame: Frame, radius: float, noise: floa
 def _turns_of_chords(
     curve: NDArray[np.intp], along: Array, heights: Array, noise: float
 ) -> tuple[NDArray[np.intp], Array, Array]:
-    """The curves (m,) of the turns from chord to chord, the steps (m,) between middles, and the turns (m,)."""
+    """Curves (m,) of the turns from chord to chord, steps (m,) between middles of chords, and turns (m,)."""
     last = np.bincount(curve) - 1
     if last.max() > CHORDS:
         rank, last = np.arange(len(curve)) - curve.searchsorted(curve), last[curve]
