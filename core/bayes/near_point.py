@@ -2,36 +2,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether the contacts near the point, by themselves, show other curvatures than the patch has.
 
-Not in the paper. A patch has the curvatures of a quartic over most of the radius. Where a tip or a fold
-bends the patch, the quartic of least squares of the contacts near the point has other ones.
+Not in the paper. A patch has the curvatures of a quartic over QUARTIC_SHARE of the radius. Where a tip or a
+fold bends the patch, the quartic of least squares of the contacts within this share has other ones.
 """
 
 import numpy as np
 
 from ..arguments import Array
 from ..patch.monge import TERMS, monomials
-from .posterior import SurfacePosterior, bent, normal_curvature_variances, terms_to
+from .posterior import QUARTIC_SHARE, SurfacePosterior, bent, normal_curvature_variances, terms_to
 from .prior import FREE
 
-# Contacts within this share of the radius are near (benchmarks.curvatures: tips of cones, folds without
-# normals). With 0.6 of them few tips and folds are found, with 0.4 patches of scans are in doubt.
-NEAR = 0.45
 INVISIBLE = 1e-12  # Directions that contacts show less, as a share of all squares, are invisible.
 ENOUGH = 1.5  # The least number of contacts, as a multiple of the rank, that shows what a quartic leaves.
 
 
-def curvature_contradiction(
-    contacts: Array, posterior: SurfacePosterior, covariance: Array, sharing: float
-) -> float:
+def curvature_contradiction(contacts: Array, posterior: SurfacePosterior, covariance: Array) -> float:
     """The deviations, at most, by which a normal curvature is off that of the contacts near the point.
 
     contacts : (n, 3), besides the reference point, in the frame and in unit radius
     posterior : of all contacts; covariance : (3, 3), of its coefficients of x^2, xy and y^2
-    sharing : how many contacts share a bend, and so an error
 
     It is 0 if there are too few contacts to judge.
     """
-    near = contacts[np.hypot(contacts[:, 0], contacts[:, 1]) <= NEAR]
+    near = contacts[np.hypot(contacts[:, 0], contacts[:, 1]) <= QUARTIC_SHARE]
     if not len(near):
         return 0.0
     basis = monomials(near, TERMS)[:, : terms_to(4)]
@@ -43,7 +37,7 @@ def curvature_contradiction(
     solution = inverse @ basis.T
     quartic, rows = solution @ near[:, 2], solution[2:FREE]
     left = near[:, 2] - basis @ quartic
-    variance = sharing**2 * float(left @ left) / (len(near) - rank)
+    variance = float(left @ left) / (len(near) - rank)
     off = quartic[2:FREE] - posterior.polynomial[2:FREE]
     variances = normal_curvature_variances(covariance + variance * rows @ rows.T)
     return float((np.abs(bent() @ off) / np.sqrt(np.maximum(variances, 1e-300))).max())

@@ -225,7 +225,14 @@ class Reconstruction:
 
     @cached_property
     def curvature_covariance(self) -> Array:
-        """The covariance of the coefficients of x^2, xy and y^2, (3, 3), in unit radius.
+        """The covariance of the coefficients of x^2, xy and y^2, (3, 3), in unit radius."""
+        # One deviation in each direction: that of the coefficient of xy is larger by the square root of 2.
+        facets = (0.5 * self.radius * max(self._off_shape, default=0.0)) ** 2 * np.diag([1.0, 2.0, 1.0])
+        return self._fitted_covariance + self.bends.covariance + facets
+
+    @property
+    def _fitted_covariance(self) -> Array:
+        """That part of it which the fit shows.
 
         A fit without a process takes the errors of contacts for independent, which those that share a bend
         are not. A patch by another method also departs from the posterior's mean.
@@ -236,9 +243,7 @@ class Reconstruction:
         if self.method != "bayes":
             off = posterior.polynomial[2:FREE] - coefficients_of(self.patch.scaled(1.0 / self.radius))[2:FREE]
             found = found + np.outer(off, off)
-        # One deviation in each direction: that of the coefficient of xy is larger by the square root of 2.
-        facets = (0.5 * self.radius * max(self._off_shape, default=0.0)) ** 2 * np.diag([1.0, 2.0, 1.0])
-        return found + self.bends.covariance + facets
+        return found
 
     @property
     def _off_shape(self) -> list[float]:
@@ -405,7 +410,7 @@ class Reconstruction:
         if status.is_on_flat_face(bent, std, self.contours, self.frame.origin):
             yield Doubt("flat_face", bent, std, useless=useless)
         yield from beyond("folds", self.bends.folded, status.DOUBTFUL_FOLD, useless)
-        yield from beyond("bend", self.curvature_contradiction, status.DOUBTFUL_BEND, useless)
+        yield from beyond("bend", self.curvature_contradiction, status.SIGNIFICANT, useless)
 
     @property
     def _notes(self) -> str:
@@ -437,8 +442,7 @@ class Reconstruction:
     @cached_property
     def curvature_contradiction(self) -> float:
         """The number of deviations by which curvatures are off those of the contacts near the point."""
-        contacts, covariance = self.contacts / self.radius, self.curvature_covariance
-        return curvature_contradiction(contacts, self.posterior, covariance, self.bends.contacts)
+        return curvature_contradiction(self.contacts / self.radius, self.posterior, self._fitted_covariance)
 
     @cached_property
     def _fitted_normals(self) -> tuple[Array, Array]:

@@ -24,8 +24,6 @@ DOUBTFUL_CURVATURE = 0.1  # Deviation of a curvature times the radius: that of c
 # Mean curvature times the radius of a curve of few bends (benchmarks.curvatures: folds of 15 and 20 degrees).
 # With less, a default cylinder is in doubt at its rim.
 DOUBTFUL_FOLD = 0.2
-# Deviations by which contacts near the point show other curvatures (benchmarks.curvatures: tips of cones).
-DOUBTFUL_BEND = 3.0
 DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve may miss the point, if it is
 OWN_POINT = 1e-6  # A contact that is nearer to the point, in unit radius, is the point.
 SIGNIFICANT = 5.0  # this many standard deviations as well.

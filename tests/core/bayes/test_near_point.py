@@ -52,5 +52,5 @@ def test_few_contacts_cannot_contradict():
     contours = surface.track(surfaces.planes((0, 60, 120)), noise=0.0)
     r = surface.fit([Contour(contour.points[::6]) for contour in contours])
     near = r.contacts[:3] / r.radius
-    assert curvature_contradiction(near, r.posterior, r.curvature_covariance, 1.0) == 0.0
-    assert curvature_contradiction(near[:0], r.posterior, r.curvature_covariance, 1.0) == 0.0
+    assert curvature_contradiction(near, r.posterior, r.curvature_covariance) == 0.0
+    assert curvature_contradiction(near[:0], r.posterior, r.curvature_covariance) == 0.0
