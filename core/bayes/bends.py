@@ -91,31 +91,37 @@ def _turns(contours: Sequence[Contour], frame: Frame, radius: float, noise: floa
     reach = np.hypot(local[:, 0], local[:, 1])
     farthest = np.lexsort((reach, curve))[sizes.cumsum() - 1]
     toward = local[farthest, :2] / np.maximum(reach[farthest, None], SMALLEST)
-    ahead = toward[curve]
-    along = np.einsum("ni,ni->n", local[:, :2], ahead)
+    along = np.einsum("ni,ni->n", local[:, :2], toward[curve])
     order = np.lexsort((along, curve))
-    along = along[order]
-    if contours[0].normals is None:
-        return _Turns(toward, *_turns_of_chords(curve, along, local[order, 2], noise), False)
-    normals = np.concatenate([c.normals for c in contours])[order]
-    # Normals may be of either side and any length, but products of large ones have to be finite.
-    normals = normals / max(float(np.abs(normals).max()), 1e-300) @ frame.axes
-    across = np.copysign(1.0, normals[:, 2]) * np.einsum("ni,ni->n", normals[:, :2], ahead)
+    if is_felt := contours[0].normals is not None:
+        normals = np.concatenate([contour.normals for contour in contours])[order]
+        # Products of the largest numbers have to be finite.
+        normals = normals / max(float(np.abs(normals).max()), 1e-300) @ frame.axes
+        along, angles = along[order], _angles(normals, toward[curve], curve)
+        stds = np.array([contour.normal_std or 0.0 for contour in contours])[curve]
+    else:
+        curve, along, angles, stds = _chords(curve, along[order], local[order, 2], noise)
+    first, second = _neighbors(curve)
+    curve, steps, turns = curve[second], along[second] - along[first], angles[second] - angles[first]
+    turns = _evened(curve, turns, steps, np.hypot(stds[first], stds[second]))
+    return _Turns(toward, curve, steps, turns, is_felt)
+
+
+def _angles(normals: Array, toward: Array, curve: NDArray[np.intp]) -> Array:
+    """The angles (n,) of normals (n, 3), of any side and length, from that of the point along a curve."""
+    across = np.copysign(1.0, normals[:, 2]) * np.einsum("ni,ni->n", normals[:, :2], toward)
     angles = np.arctan2(across, np.abs(normals[:, 2]))
     # One contact alone that turns another way and back is an outlier.
     at = (curve[2:] == curve[:-2]).nonzero()[0] + 1
     before, now, after = angles[at - 1], angles[at], angles[at + 1]
     angles[at] = np.maximum(np.minimum(before, now), np.minimum(np.maximum(before, now), after))
-    stds = math.sqrt(2.0) * np.array([c.normal_std or 0.0 for c in contours])
-    first, second = _neighbors(curve)
-    curve, steps, turns = curve[second], along[second] - along[first], angles[second] - angles[first]
-    return _Turns(toward, curve, steps, _evened(curve, turns, steps, stds[curve]), True)
+    return angles
 
 
-def _turns_of_chords(
+def _chords(
     curve: NDArray[np.intp], along: Array, heights: Array, noise: float
-) -> tuple[NDArray[np.intp], Array, Array]:
-    """Curves (m,) of the turns from chord to chord, steps (m,) between middles of chords, and turns (m,)."""
+) -> tuple[NDArray[np.intp], Array, Array, Array]:
+    """Of the chords between contacts (n,) in order: curves, middles, angles and their deviations, (m,)."""
     last = np.bincount(curve) - 1
     if last.max() > CHORDS:
         rank, last = np.arange(len(curve)) - curve.searchsorted(curve), last[curve]
@@ -123,12 +129,9 @@ def _turns_of_chords(
         curve, along, heights = curve[chosen], along[chosen], heights[chosen]
     first, second = _neighbors(curve)
     lengths = np.maximum(along[second] - along[first], SMALLEST)
-    slopes, curve = np.arctan2(heights[second] - heights[first], lengths), curve[second]
-    first, second = _neighbors(curve)
-    turns, curve = slopes[second] - slopes[first], curve[second]
-    before, after = lengths[first], lengths[second]
-    steps, stds = 0.5 * (before + after), noise * math.sqrt(6.0) / np.minimum(before, after)
-    return curve, steps, _evened(curve, turns, steps, stds)
+    angles = np.arctan2(heights[second] - heights[first], lengths)
+    # Neighbors have a contact in common, so the deviation of a turn is the square root of 6 in place of 4.
+    return curve[second], 0.5 * (along[first] + along[second]), angles, math.sqrt(3.0) * noise / lengths
 
 
 def _neighbors(curve: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
