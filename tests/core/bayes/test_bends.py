@@ -56,6 +56,18 @@ def test_an_automatic_touch_between_folds_stays_on_its_face(turn):
     assert max(abs(r.k1), abs(r.k2)) * r.radius < 1e-6
 
 
+@pytest.mark.parametrize("angle", [5, 10, 20])
+def test_without_normals_the_deviation_contains_the_curvature_of_folds(angle):
+    """A fold between two contacts is a bend of two chords, which few contacts show from a smooth curve."""
+    rng, sure = np.random.default_rng(angle), 0
+    for r in touches(angle, 24, 1, extent=rng.uniform(0.4, 1.0)):
+        bare = [replace(contour, normals=None) for contour in r.contours]
+        found = core.reconstruct(r.point, bare, outward=(0.0, 0.0, 1.0))
+        assert not is_silent(found)
+        sure += found.status == "ok"
+    assert sure > 0
+
+
 def test_a_touch_across_folds_names_them():
     (r,) = touches(20, 1, 2, extent=1.0)
     assert r.message.startswith("The surface turns at only one or two places along a curve")
