@@ -70,7 +70,7 @@ def test_without_normals_the_deviation_contains_the_curvature_of_folds(angle):
 
 def test_a_touch_across_folds_names_them():
     (r,) = touches(20, 1, 2, extent=1.0)
-    assert r.message.startswith("The surface turns at only one or two places along a curve")
+    assert r.message.startswith("The surface turns at three places or fewer along a curve")
     assert "use a shorter extent, move the point away from folds, or make the facets finer" in r.message
 
 
