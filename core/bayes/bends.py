@@ -31,14 +31,24 @@ FLAT = 1e-6  # A curve whose normals turn by less, in radians, turns by rounding
 class Bends(NamedTuple):
     """How unevenly a surface bends along curves.
 
-    covariance : (3, 3), of the coefficients of x^2, xy and y^2 in unit radius, for want of bends
+    second : (3, c), the second derivatives of x^2, xy and y^2 along each of c curves
+    stds : (c,), deviations of the curvatures along these for want of bends, in unit radius
     contacts : how many contacts share a bend, 1 or more
     folded : the largest mean curvature of a curve of fewer than FEW bends, in unit radius
     """
 
-    covariance: Array
+    second: Array
+    stds: Array
     contacts: float
     folded: float
+
+    @property
+    def covariance(self) -> Array:
+        """The covariance (3, 3) of the coefficients of x^2, xy and y^2 in unit radius, for want of bends."""
+        second = self.second
+        inverse = np.linalg.solve(second @ second.T + RIDGE * np.eye(3), second)
+        covariance: Array = (inverse * self.stds**2) @ inverse.T
+        return covariance
 
 
 def bends_of(contours: Sequence[Contour], frame: Frame, radius: float, noise: float, terms: Array) -> Bends:
@@ -57,14 +67,10 @@ def bends_of(contours: Sequence[Contour], frame: Frame, radius: float, noise: fl
     ]
     each = [_bends(_turns(kind, frame, radius, noise)) for kind in kinds if kind]
     x, y, turned, shares, bent, contacts = np.concatenate([np.empty((6, 0)), *each], axis=1)
-    if not turned.any():
-        return Bends(np.zeros((3, 3)), 1.0, 0.0)
     second = 2.0 * np.array([x * x, x * y, y * y])
-    inverse = np.linalg.solve(second @ second.T + RIDGE * np.eye(3), second)
-    folded = float(bent[shares > 1.0].max(initial=0.0))
-    bent = np.maximum(bent, np.abs(terms @ second))
-    covariance = (inverse * (shares * bent) ** 2) @ inverse.T
-    return Bends(covariance, float(turned @ contacts / turned.sum()), folded)
+    stds = shares * np.maximum(bent, np.abs(terms @ second))
+    sharing = float(turned @ contacts) / max(float(turned.sum()), SMALLEST)
+    return Bends(second, stds, max(sharing, 1.0), float(bent[shares > 1.0].max(initial=0.0)))
 
 
 class _Turns(NamedTuple):

@@ -21,7 +21,7 @@ WAVINESS = np.geomspace(0.15, 1.3, 6)
 WAVINESS_SPREAD = 0.5  # The waviness has a log-normal prior with the median USUAL_WAVINESS and this sigma.
 UNUSUAL = (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD) ** 2  # -2 log of that prior.
 VARIANCES = prior_variances(WAVINESS)
-NOISES = 5  # The number of points in the grid of the noise, from the floor up.
+NOISES = np.linspace(0.0, 1.0, 5)  # The logarithms of the noise, as shares of the way from floor to most.
 ROUNDING = 1e-13  # Rounding takes at most this share of a system's trace.
 QUADRIC = np.array([*range(FREE), -1])  # The rows of a quadric and of the heights.
 UNLIKELY = 1400.0  # The exponential of half this difference of -2 log likelihood is still a number.
@@ -71,12 +71,12 @@ def neg2_log_evidence(heights: Array, counts: Array, slopes: Array, prior: Array
 
 
 def noise_grid(heights: Array, counts: Array, floor: Array) -> Array:
-    """A grid of the noise, (b, NOISES), from the floor (b,) to beyond what a quadric leaves of contacts."""
+    """A grid of the noise, (b, 5), from the floor (b,) to beyond what a quadric leaves of contacts."""
     bordered = heights[:, QUADRIC[:, None], QUADRIC]
     np.einsum("bii->bi", bordered)[:] += ROUNDING * np.einsum("bii->b", bordered)[:, None]  # a view
     left = np.linalg.cholesky(bordered)[:, -1, -1]  # the root of the sum of squares
     largest = 2.0 + 3.0 / floor * left / np.sqrt(counts)
-    return floor[:, None] * largest[:, None] ** np.linspace(0.0, 1.0, NOISES)
+    return floor[:, None] * largest[:, None] ** NOISES
 
 
 def hyperparameters(heights: Array, counts: Array, slopes: Array, floor: Array) -> Hyperparameters:
