@@ -110,7 +110,7 @@ REASONS = {
         (SHORTER, "move the point away from them"),
     ),
     "folds": Reason(
-        "The surface turns at only one or two places along a curve, as at folds or facets, and the curvature "
+        "The surface turns at three places or fewer along a curve, as at folds or facets, and the curvature "
         "is that of these",
         (SHORTER, "move the point away from folds", FINER_FACETS),
     ),

@@ -14,13 +14,16 @@ import numpy as np
 
 from ..arguments import Array
 from ..lapack import cholesky_in_place, on_one_thread
-from .prior import FREE, USUAL_WAVINESS, prior_variances
+from .prior import FREE, USUAL_VARIANCES, USUAL_WAVINESS, prior_variances
 
 # Chosen with benchmarks.accuracy.
 WAVINESS = np.geomspace(0.15, 1.3, 6)
 WAVINESS_SPREAD = 0.5  # The waviness has a log-normal prior with the median USUAL_WAVINESS and this sigma.
-NOISES = 5  # The number of points in the grid of the noise, from the floor up.
+UNUSUAL = (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD) ** 2  # -2 log of that prior.
+VARIANCES = prior_variances(WAVINESS)
+NOISES = np.linspace(0.0, 1.0, 5)  # The logarithms of the noise, as shares of the way from floor to most.
 ROUNDING = 1e-13  # Rounding takes at most this share of a system's trace.
+QUADRIC = np.array([*range(FREE), -1])  # The rows of a quadric and of the heights.
 UNLIKELY = 1400.0  # The exponential of half this difference of -2 log likelihood is still a number.
 GROUP = 4  # The number of touches whose likelihoods are computed at once (benchmarks.speed, e20b52a).
 # Chosen with benchmarks.real.
@@ -68,13 +71,12 @@ def neg2_log_evidence(heights: Array, counts: Array, slopes: Array, prior: Array
 
 
 def noise_grid(heights: Array, counts: Array, floor: Array) -> Array:
-    """A grid of the noise, (b, NOISES), from the floor (b,) to beyond what a quadric leaves of contacts."""
-    which = [*range(FREE), -1]
-    bordered = heights[:, which][:, :, which]
+    """A grid of the noise, (b, 5), from the floor (b,) to beyond what a quadric leaves of contacts."""
+    bordered = heights[:, QUADRIC[:, None], QUADRIC]
     np.einsum("bii->bi", bordered)[:] += ROUNDING * np.einsum("bii->b", bordered)[:, None]  # a view
     left = np.linalg.cholesky(bordered)[:, -1, -1]  # the root of the sum of squares
     largest = 2.0 + 3.0 / floor * left / np.sqrt(counts)
-    return floor[:, None] * largest[:, None] ** np.linspace(0.0, 1.0, NOISES)
+    return floor[:, None] * largest[:, None] ** NOISES
 
 
 def hyperparameters(heights: Array, counts: Array, slopes: Array, floor: Array) -> Hyperparameters:
@@ -84,13 +86,12 @@ def hyperparameters(heights: Array, counts: Array, slopes: Array, floor: Array) 
 
     They are found in groups that fit into a processor's cache.
     """
-    noises, prior = noise_grid(heights, counts, floor), prior_variances(WAVINESS)
+    noises = noise_grid(heights, counts, floor)
     groups = [slice(start, start + GROUP) for start in range(0, len(noises), GROUP)]
-    found = [neg2_log_evidence(heights[g], counts[g], slopes[g], prior, noises[g]) for g in groups]
-    unusual = (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD) ** 2  # -2 log of the waviness's prior
-    p = likelihoods(np.concatenate(found) + unusual[:, None])
+    found = [neg2_log_evidence(heights[g], counts[g], slopes[g], VARIANCES, noises[g]) for g in groups]
+    p = likelihoods(np.concatenate(found) + UNUSUAL[:, None])
     noise = np.sqrt(np.einsum("bn,bn->b", p.sum(axis=1), noises**2))
-    return Hyperparameters(p.sum(axis=2) @ prior, noise)
+    return Hyperparameters(p.sum(axis=2) @ VARIANCES, noise)
 
 
 def likelihoods(neg2_log: Array, power: float = 1.0) -> Array:
@@ -110,7 +111,7 @@ def process_hyperparameters(
     kernels : (m, m) each, of unit variance, likewise; least, most : bounds of the noise
     """
     noises = least * (most / least) ** np.linspace(0.0, 1.0, PROCESS_NOISES)
-    prior = np.minimum(prior_variances(np.array(USUAL_WAVINESS)), MOST_VARIANCE)
+    prior = np.minimum(USUAL_VARIANCES, MOST_VARIANCE)
     found = process_neg2_log_evidence(rows, kernels, prior, noises)
     p = likelihoods(found.reshape(1, len(kernels), -1), POWER).reshape(found.shape)
     noise = np.sqrt(p.sum(axis=(0, 1)) @ noises**2)

@@ -18,7 +18,7 @@ from ..contours.contour import along, cross, dot, scaled
 from ..contours.local_geometry import UMBILIC
 from .evidence import Hyperparameters
 from .posterior import SurfacePosterior
-from .prior import FREE, USUAL_WAVINESS, prior_mean, prior_variances
+from .prior import FREE, USUAL_VARIANCES, prior_mean
 from .sextic import Sextics, mean_given, posterior_given, sextics, with_scatter
 
 # The noise is at least this share of the radius, because no surface is a polynomial. With less the waviness
@@ -82,7 +82,7 @@ def joint_fit(
     Student t distribution.
     """
     floor = np.maximum(given.noise, MISFIT)
-    usual = prior_variances(np.full(len(k1), USUAL_WAVINESS))
+    usual = USUAL_VARIANCES[None].repeat(len(k1), axis=0)
     state = _State(_first_axes(given.contacts, weights, k1, k2), k1, k2, weights, usual, floor)
     return _passes(given._replace(noise=floor), state, 0)
 
@@ -108,7 +108,7 @@ def _first_axes(contacts: Array, weights: Array, k1: Array, k2: Array) -> Array:
     a plane they are toward the farthest contact.
     """
     axes = np.eye(3)[None].repeat(len(contacts), axis=0)
-    for i in np.flatnonzero(k2 - k1 <= 2.0 * UMBILIC * np.maximum(1.0, np.abs(k1))):
+    for i in (k2 - k1 <= 2.0 * UMBILIC * np.maximum(1.0, np.abs(k1))).nonzero()[0]:
         away = np.hypot(contacts[i, :, 0], contacts[i, :, 1]) * weights[i]
         heights = (np.abs(contacts[i, :, 2]) * weights[i]).round(DECIMALS)
         chosen = np.argmax(heights if heights.any() else away.round(DECIMALS))
@@ -183,7 +183,7 @@ def posteriors_of(
     """
     b = len(weights)
     expected, local = prior_mean(np.full(b, k1), np.full(b, k2)), contacts[None].repeat(b, axis=0)
-    floor, usual = np.full(b, max(noise, MISFIT)), prior_variances(np.full(b, USUAL_WAVINESS))
+    floor, usual = np.full(b, max(noise, MISFIT)), USUAL_VARIANCES[None].repeat(b, axis=0)
     data = sextics(local, weights, expected, local[:, :0], point_std / floor)
     hyper = data.hyperparameters(floor) if by_evidence else Hyperparameters(usual, floor)
     return posterior_given(expected + mean_given(data, hyper), data, hyper)
@@ -192,7 +192,7 @@ def posteriors_of(
 def _student_weights(residuals: Array, present: NDArray[np.bool_], floor: Array) -> Array:
     """Weights of the contacts, (b, n): all 1 if none of a touch is outlying, 0 where there is no contact."""
     misses, found = np.abs(residuals), present.astype(float)
-    for i in np.flatnonzero((present & (misses > OUTLYING * floor[:, None])).any(axis=1)):
+    for i in (present & (misses > OUTLYING * floor[:, None])).any(axis=1).nonzero()[0]:
         ratios = misses[i] / max(floor[i], 1.4826 * float(np.median(misses[i][present[i]])))
         if ratios[present[i]].max() > OUTLYING:
             found[i] *= (STUDENT + 1.0) / (STUDENT + ratios**2)

@@ -9,11 +9,11 @@ fold bends the patch, the quartic of least squares of the contacts within this s
 import numpy as np
 
 from ..arguments import Array
-from ..patch.monge import QUARTIC, monomials
-from .posterior import QUARTIC_SHARE, SurfacePosterior, bent
+from ..patch.monge import TERMS, monomials
+from .posterior import QUARTIC_SHARE, SurfacePosterior, bent, normal_curvature_variances, terms_to
 from .prior import FREE
 
-INVISIBLE = 1e-6  # Directions of smaller singular values, as a share of the largest, are invisible.
+INVISIBLE = 1e-12  # Directions that contacts show less, as a share of all squares, are invisible.
 ENOUGH = 1.5  # The least number of contacts, as a multiple of the rank, that shows what a quartic leaves.
 
 
@@ -26,18 +26,18 @@ def curvature_contradiction(contacts: Array, posterior: SurfacePosterior, covari
     It is 0 if there are too few contacts to judge.
     """
     near = contacts[np.hypot(contacts[:, 0], contacts[:, 1]) <= QUARTIC_SHARE]
-    basis = monomials(near, QUARTIC)[:, 1:]
-    u, singular, v = np.linalg.svd(basis, full_matrices=False)
-    shown = singular > INVISIBLE * singular[:1]
-    rank = int(shown.sum())
-    if not rank or len(near) < ENOUGH * rank:
+    if not len(near):
         return 0.0
-    inverse = v[shown].T / singular[shown]
-    quartic = inverse @ (u[:, shown].T @ near[:, 2])
+    basis = monomials(near, TERMS)[:, : terms_to(4)]
+    gram = basis.T @ basis
+    inverse = np.linalg.inv(gram + INVISIBLE * gram.trace() * np.eye(len(gram)))
+    rank = float((inverse * gram).sum())
+    if len(near) < ENOUGH * rank:
+        return 0.0
+    solution = inverse @ basis.T
+    quartic, rows = solution @ near[:, 2], solution[2:FREE]
     left = near[:, 2] - basis @ quartic
     variance = float(left @ left) / (len(near) - rank)
-    rows = inverse[2:FREE]
     off = quartic[2:FREE] - posterior.polynomial[2:FREE]
-    directions = bent()
-    variances = np.einsum("ni,ij,nj->n", directions, covariance + variance * rows @ rows.T, directions)
-    return float(np.max(np.abs(directions @ off) / np.sqrt(np.maximum(variances, 1e-300))))
+    variances = normal_curvature_variances(covariance + variance * rows @ rows.T)
+    return float((np.abs(bent() @ off) / np.sqrt(np.maximum(variances, 1e-300))).max())

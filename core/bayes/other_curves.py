@@ -28,11 +28,9 @@ def contradicting_curve(
     posterior : of all contacts; noise : least deviation of a contact; point_std : as in `Observations`
 
     Both are medians over the outer contacts of the curve that is off by most deviations, so outliers do not
-    count. They are 0 if there are too few curves to judge.
+    count. There are ENOUGH curves or more.
     """
     numbers = np.unique(curve)
-    if len(numbers) < ENOUGH:
-        return 0.0, 0.0
     others = (curve != numbers[numbers >= 0][:, None]).astype(float)
     k1, k2 = (2.0 * float(posterior.polynomial[i]) for i in (2, 4))  # The terms x^2 and y^2.
     usual = posteriors_of(k1, k2, contacts, others, float(posterior.noise), point_std, by_evidence=False)

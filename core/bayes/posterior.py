@@ -105,10 +105,6 @@ class SurfacePosterior(HeightField):
         root[..., :-1] = root[..., :-1] @ np.swapaxes(turn, -1, -2)
         return replace(self, mean=(turn @ self.mean[..., None])[..., 0], root=root)
 
-    def residuals(self, contacts: Array) -> Array:
-        """The heights (b, n) of contacts (b, n, 3) above b polynomials."""
-        return contacts[..., 2] - (monomials(contacts, TERMS) @ self.mean[..., None])[..., 0]
-
     # What follows is for a single posterior, not for a stack.
 
     @property
@@ -118,10 +114,11 @@ class SurfacePosterior(HeightField):
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The mean height at (x, y)."""
-        z: Array = polynomial_derivatives(self.mean, TERMS, x, y, PARTIALS[:1])[0]
+        at = _rows(x, y)
+        z: Array = monomials(at, TERMS) @ self.mean
         if len(self.places):
-            z += weighted_kernel(_rows(x, y), self.places, self.variances, self.alpha).reshape(z.shape)
-        return z
+            z += weighted_kernel(at, self.places, self.variances, self.alpha)
+        return z.reshape(np.broadcast_shapes(np.shape(x), np.shape(y)))
 
     def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
         """Height, slopes and second derivatives of the mean at (x, y)."""
@@ -132,7 +129,11 @@ class SurfacePosterior(HeightField):
 
     def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Standard deviations of the height at n points, (n,)."""
-        known, left = self._whitened(_rows(x, y))
+        at = _rows(x, y)
+        if not len(self.places):
+            left = monomials(at, TERMS) @ self.root[:, :-1].T + self.root[:, -1]
+            return np.sqrt(np.einsum("ni,ni->n", left, left))
+        known, left = self._whitened(at)
         variance = np.einsum("in,in->n", left, left) - np.einsum("in,in->n", known, known)
         return np.sqrt(np.maximum(self.variances.sum() + variance, 0.0))
 
@@ -213,13 +214,15 @@ class SurfacePosterior(HeightField):
         a = _truncation(degree) @ self.polynomial[FREE:]
         return MongePatch(2.0 * float(self.polynomial[2]), 2.0 * float(self.polynomial[4]), a)
 
-    def degree_shown(self, contacts: Array) -> int:
-        """The least degree whose patch is off the mean by at most half its deviation at contacts (n, 3)."""
-        basis = monomials(contacts, TERMS)
+    def degree_shown(self, basis: Array) -> int:
+        """The least degree whose patch is off the mean by at most half its deviation at contacts.
+
+        basis : (n, 27), the terms there
+        """
         left = basis @ self.root[:, :-1].T
         variance = np.einsum("ni,ni->", left, left)
         off = basis[:, FREE:] @ (_departures() @ self.polynomial[FREE:]).T
-        enough = np.flatnonzero(np.einsum("nk,nk->k", off, off) <= 0.25 * variance)
+        enough = (np.einsum("nk,nk->k", off, off) <= 0.25 * variance).nonzero()[0]
         return LEAST_DEGREE + int(enough[0]) if len(enough) else DEGREE
 
     def turn(self, confidence: float = CONFIDENCE) -> float:
@@ -256,9 +259,7 @@ class SurfacePosterior(HeightField):
 
     def curvature_std(self) -> float:
         """Standard deviation of the normal curvature at the origin, in the direction where it is largest."""
-        directions = bent()
-        covariances = directions @ self.covariance[2:FREE, 2:FREE]
-        variances = np.einsum("ni,ni->n", covariances, directions)
+        variances = normal_curvature_variances(self.covariance[2:FREE, 2:FREE])
         return math.sqrt(max(float(variances.max()), 0.0))
 
     def null_space_dimension(self, degree: int) -> int:
@@ -330,6 +331,13 @@ def bent() -> Array:
     return 2.0 * monomials(np.column_stack([np.cos(azimuths), np.sin(azimuths)]), TERMS[2:FREE])
 
 
+def normal_curvature_variances(covariance: Array) -> Array:
+    """Variances (18,) of the derivatives of `bent`, by the covariance (3, 3) of x^2, xy and y^2."""
+    directions = bent()
+    variances: Array = np.einsum("ni,ni->n", directions @ covariance, directions)
+    return variances
+
+
 @cache
 def _normal_points() -> Array:
     """Points (2, 256) that are spread as a normal distribution: on the spiral of a sunflower."""
@@ -360,7 +368,7 @@ def nearest_quartic(mean: Array, alpha: Array, places: Array, variances: Array) 
 
 def _rows(x: ArrayLike, y: ArrayLike) -> Array:
     """Points (n, 2) of raveled x and y."""
-    return np.column_stack([np.ravel(v) for v in np.broadcast_arrays(x, y)])
+    return np.array(np.broadcast_arrays(x, y), dtype=float).reshape(2, -1).T
 
 
 @cache

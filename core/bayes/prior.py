@@ -28,6 +28,9 @@ def prior_variances(waviness: Array) -> Array:
     return np.where(ORDERS < 3.0, FREE_VARIANCE, higher)
 
 
+USUAL_VARIANCES = prior_variances(np.array(USUAL_WAVINESS))
+
+
 def prior_mean(k1: Array, k2: Array) -> Array:
     """The prior's mean, (b, 27): the quartic and sextic of a surface that goes on with its curvatures (b,).
 

@@ -9,6 +9,7 @@ without a process, and their intervals are true. If contacts are off that sextic
 smooth surface whose mesh has facets, its frame and curvatures are kept, because it averages the facets.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -66,13 +67,18 @@ def touch_of(contacts: Array, roots: Array, normals: Array, places: NDArray[np.i
 
 
 def process_fit(
-    given: Observations, weights: Array, posterior: SurfacePosterior, ranks: NDArray[np.intp], offsets: Array
+    given: Observations,
+    weights: Array,
+    posterior: SurfacePosterior,
+    residuals: Array,
+    ranks: Callable[[int], NDArray[np.intp]],
+    offsets: Array,
 ) -> tuple[Array, Array, list[SurfacePosterior]]:
     """The fits of b touches, with a process where the evidence favors one, and unchanged elsewhere.
 
     given : in the Darboux frames of the sextics, whose posteriors are a stack
-    weights : (b, n), 0 where there is no contact
-    ranks : (b, n), of the contacts on each half of a curve, from the rim, and of those of strokes
+    weights : (b, n), 0 where there is no contact; residuals : (b, n), those of the sextics
+    ranks : gives those (n,) of a touch's contacts on each half of a curve, from the rim, and of strokes
     offsets : (b,), the height of the reference point above the origin
 
     Returns the columns d1, d2, n (b, 3, 3) in the frame given, the new radii (b,) in its unit, and the
@@ -80,11 +86,11 @@ def process_fit(
     """
     b, least = len(weights), np.maximum(given.noise, PROCESS_MISFIT)
     turns, scales, found = np.eye(3)[None].repeat(b, axis=0), np.ones(b), [posterior.at(i) for i in range(b)]
-    off, most = np.abs(posterior.residuals(given.contacts)), np.maximum(posterior.noise, least)
+    off, most = np.abs(residuals), np.maximum(posterior.noise, least)
     rms = np.sqrt((weights * off**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0))
-    for i in np.flatnonzero(rms > UNEXPLAINED_MISFIT * least):
+    for i in (rms > UNEXPLAINED_MISFIT * least).nonzero()[0]:
         there = np.flatnonzero(weights[i])
-        touch = _with_point(given, weights[i], ranks[i], float(offsets[i]), int(i))
+        touch = _with_point(given, weights[i], ranks(int(i)), float(offsets[i]), int(i))
         carried = touch.at_places()
         hyper, use_gp = process_hyperparameters(*carried, float(least[i]), float(most[i]))
         if not (use_gp or (given.noise_is_known[i] and _is_texture(off[i, there], float(given.noise[i])))):
@@ -105,7 +111,7 @@ def process_fit(
 def _with_point(given: Observations, weights: Array, ranks: NDArray[np.intp], offset: float, i: int) -> Touch:
     """Touch i of a stack with the reference point, which is a contact like the others.
 
-    On facets its residual may be as large. weights, ranks : (n,), as in `process_fit`
+    On facets its residual may be as large. weights, ranks : (n,), those of `process_fit`
     """
     there, point = np.flatnonzero(weights), np.array([[0.0, 0.0, offset]])
     normals = (

@@ -13,7 +13,7 @@ from ..arguments import Array
 from ..patch.monge import TERMS
 from .evidence import Hyperparameters
 from .joint_fit import MISFIT
-from .prior import USUAL_WAVINESS, prior_variances
+from .prior import USUAL_VARIANCES
 from .sextic import mean_given, sextics
 
 # benchmarks.extents of e20b52a judged these.
@@ -34,7 +34,7 @@ def roughness(contacts: Array, noise: float) -> float:
     data = sextics(
         local[None], np.ones((1, len(local))), np.zeros((1, len(TERMS))), local[None, :0], np.zeros(1)
     )
-    usual = prior_variances(np.array([USUAL_WAVINESS]))
-    off = data.residuals(mean_given(data, Hyperparameters(usual, np.array([MISFIT]))))[0]
+    usual = Hyperparameters(USUAL_VARIANCES[None], np.array([MISFIT]))
+    off = data.residuals(mean_given(data, usual))[0]
     variance = float(off @ off) / max(len(off) - EXPLAINED_TERMS, 1)
     return math.sqrt(max(variance - (NOISY * noise / radius) ** 2, 0.0))

@@ -42,7 +42,7 @@ class Sextics(NamedTuple):
     @property
     def counts(self) -> Array:
         """The number of contacts, (b,)."""
-        return np.count_nonzero(self.weights, axis=1).astype(float)
+        return (self.weights > 0.0).sum(axis=1, dtype=float)
 
     def residuals(self, coefficients: Array) -> Array:
         """What the coefficients (b, 27) do not explain of the heights, (b, n)."""
@@ -77,7 +77,7 @@ def sextics(local: Array, weights: Array, expected: Array, normals: Array, point
     squared, pivot, offset = rows, np.zeros((b, len(TERMS))), np.zeros(b)
     if point_std.any():
         total, share = weights.sum(axis=1), offset_share(weights, point_std)
-        means = np.einsum("bin,bn->bi", rows, weights) / total[:, None]
+        means = (rows @ weights[..., None])[..., 0] / total[:, None]
         # Their squares are those of all rows less f W m m', without a difference that rounds.
         squared = rows - ((1.0 - np.sqrt(1.0 - share))[:, None] * means)[..., None]
         rows -= (share[:, None] * means)[..., None]

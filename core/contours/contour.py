@@ -221,8 +221,9 @@ def equal_points(points: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 def unit_normals(normals: Array) -> Array:
     """Normals (n, 3) of any length, scaled to length 1; (0, 0, 0) stays."""
-    unit = normals / np.maximum(np.abs(normals).max(axis=1, keepdims=True), 1e-300)
-    return np.asarray(unit / np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-300))
+    unit = normals / np.maximum(np.abs(normals).max(axis=1), 1e-300)[:, None]
+    lengths = np.sqrt(np.einsum("ni,ni->n", unit, unit))
+    return np.asarray(unit / np.maximum(lengths, 1e-300)[:, None])
 
 
 def consistently_oriented(normals: Array, order: NDArray[np.intp], starts: NDArray[np.intp]) -> Array:

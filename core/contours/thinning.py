@@ -66,8 +66,10 @@ def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:
 
 def _may_rest(r: Array) -> bool:
     """Whether contacts (n, 3), relative to the point, may have a rest; a quick no for most that have none."""
-    distance = np.sort(np.sqrt(np.einsum("ni,ni->n", r, r)))
-    return bool((distance[RESTING:] - distance[:-RESTING] <= 3.0 / CELLS * distance[-1:]).any())
+    distance = np.sqrt(np.einsum("ni,ni->n", r, r))
+    distance.sort()
+    gaps = distance[RESTING:] - distance[:-RESTING]
+    return len(gaps) > 0 and float(gaps.min()) <= 3.0 / CELLS * float(distance[-1])
 
 
 def _along(r: Array, distance: Array) -> tuple[Array, Array]:

@@ -64,12 +64,13 @@ class Domain:
         system[rows, rows] = 2.0 * (lengths + before)
         system[rows, last], system[rows, following] = lengths, before
         right = 3.0 * (over * rise[last] + before[:, None] * rise)
-        is_open = np.zeros(len(rows), dtype=bool) if self.open_ends is None else self.open_ends
-        straight = is_open | is_open[following]  # pieces, each from its end to the next
-        adjacent = straight | straight[last]
-        system[adjacent] = np.eye(len(rows))[adjacent]
-        right[adjacent] = self.ends[adjacent] @ QUARTER_TURN
-        right[adjacent] /= np.linalg.norm(self.ends[adjacent], axis=1, keepdims=True)
+        straight = np.zeros(len(rows), dtype=bool)
+        if self.open_ends is not None:
+            straight = self.open_ends | self.open_ends[following]  # pieces, each from its end to the next
+            adjacent = straight | straight[last]
+            system[adjacent] = np.eye(len(rows))[adjacent]
+            right[adjacent] = self.ends[adjacent] @ QUARTER_TURN
+            right[adjacent] /= np.linalg.norm(self.ends[adjacent], axis=1, keepdims=True)
         slopes = np.linalg.solve(system, right)
         bend = (slopes + slopes[following] - 2.0 * rise) / over
         pieces = np.array([self.ends, slopes, (rise - slopes) / over - bend, bend / over])
@@ -236,7 +237,7 @@ def closed_spline_domain(ends: ArrayLike, radius: float, open_ends: ArrayLike | 
     """
     x, y = np.asarray(ends, dtype=float).T
     is_open = np.zeros(len(x), dtype=bool) if open_ends is None else np.asarray(open_ends, dtype=bool)
-    out = np.flatnonzero(x * x + y * y > (SAME_END * radius) ** 2)
+    out = (x * x + y * y > (SAME_END * radius) ** 2).nonzero()[0]
     order = out[np.argsort(np.arctan2(y[out], x[out]), kind="stable")]
     x, y, is_open = x[order], y[order], is_open[order]
     before = np.arange(-1, len(x) - 1)

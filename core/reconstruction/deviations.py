@@ -5,6 +5,7 @@
 import numpy as np
 
 from ..arguments import Array
+from ..bayes.prior import FREE
 from ..patch.monge import PARTIALS, TERMS, derived_monomials
 from .result import Reconstruction
 
@@ -17,10 +18,12 @@ def gaussian_curvature_stds(r: Reconstruction, x: Array, y: Array) -> Array:
     """Standard deviations (m,) of K of a patch's polynomial at local x and y, (m,) each, in 1/length^2.
 
     They follow from the gradient of K in the coefficients and, since that does not suffice at a rim, from
-    the second-order variance of z_xx z_yy - z_xy^2 for normally distributed second derivatives.
+    the second-order variance of z_xx z_yy - z_xy^2 for normally distributed second derivatives. Few bends
+    widen them as they do those of curvatures at the point.
     """
     by = derived_monomials(np.stack([x, y], axis=-1) / r.radius, TERMS, PARTIALS[1:])
-    derivatives, covariance = by @ r.posterior.polynomial, r.posterior.covariance
+    derivatives, covariance = by @ r.posterior.polynomial, r.posterior.covariance.copy()
+    covariance[2:FREE, 2:FREE] = r.curvature_covariance
     zx, zy, zxx, zxy, zyy = derivatives[:, :, None]
     steep = 1.0 + zx**2 + zy**2
     k = (zxx * zyy - zxy**2) / steep**2

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from statistics import median
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +16,7 @@ from ..bayes.bends import Bends, bends_of
 from ..bayes.joint_fit import OUTLYING, posterior_of
 from ..bayes.near_point import curvature_contradiction
 from ..bayes.normals import contradiction, measured_normals, scatter
-from ..bayes.other_curves import contradicting_curve
+from ..bayes.other_curves import ENOUGH, contradicting_curve
 from ..bayes.posterior import SurfacePosterior, coefficients_of, terms_to
 from ..bayes.prior import FREE
 from ..contours.contour import SURFACE_ENDS, Contour, read_only, stops_at
@@ -114,10 +115,10 @@ class Reconstruction:
     def contacts(self) -> Array:
         """The fitted contacts besides the reference point, (n, 3), in the frame."""
         each = zip(self.contours, self._off_point, strict=True)
-        points = np.vstack([*(contour.points[off] for contour, off in each), self.strokes])
+        points = np.concatenate([*(contour.points[off] for contour, off in each), self.strokes])
         return self.frame.to_local(points)
 
-    @property
+    @cached_property
     def _off_point(self) -> list[NDArray[np.bool_]]:
         """Which contacts of each contour are not the reference point."""
         return [distances_from_point(contour.points - self._meeting)[1] for contour in self.contours]
@@ -224,7 +225,14 @@ class Reconstruction:
 
     @cached_property
     def curvature_covariance(self) -> Array:
-        """The covariance of the coefficients of x^2, xy and y^2, (3, 3), in unit radius.
+        """The covariance of the coefficients of x^2, xy and y^2, (3, 3), in unit radius."""
+        # One deviation in each direction: that of the coefficient of xy is larger by the square root of 2.
+        facets = (0.5 * self.radius * max(self._off_shape, default=0.0)) ** 2 * np.diag([1.0, 2.0, 1.0])
+        return self._fitted_covariance + self.bends.covariance + facets
+
+    @property
+    def _fitted_covariance(self) -> Array:
+        """That part of it which the fit shows.
 
         A fit without a process takes the errors of contacts for independent, which those that share a bend
         are not. A patch by another method also departs from the posterior's mean.
@@ -235,23 +243,24 @@ class Reconstruction:
         if self.method != "bayes":
             off = posterior.polynomial[2:FREE] - coefficients_of(self.patch.scaled(1.0 / self.radius))[2:FREE]
             found = found + np.outer(off, off)
-        # One deviation in each direction: that of the coefficient of xy is larger by the square root of 2.
-        facets = (0.5 * self.radius * self._off_shape.max(initial=0.0)) ** 2 * np.diag([1.0, 2.0, 1.0])
-        return found + self.bends.covariance + facets
+        return found
 
     @property
-    def _off_shape(self) -> Array:
-        """How far principal curvatures are off each estimate of those of the shape, (n,)."""
-        return np.abs(np.sort([self.k1, self.k2]) - self.shape_curvatures).max(axis=1)
+    def _off_shape(self) -> list[float]:
+        """How far principal curvatures are off each estimate of those of the shape."""
+        low, high = sorted((self.k1, self.k2))
+        return [max(abs(low - k1), abs(high - k2)) for k1, k2 in self.shape_curvatures.tolist()]
 
     @cached_property
     def bends(self) -> Bends:
         """How unevenly the surface bends along the curves."""
         fitted = float(self.posterior.noise)
         noises = [fitted if c.noise is None else c.noise / self.radius for c in self.contours]
-        most = OUTLYING * fitted * self.radius
-        explained = (self._explained(c, most) if c.normals is None else c for c in self.contours)
-        return bends_of(tuple(explained), self.frame, self.radius, max(noises, default=0.0))
+        contours, most = self.contours, OUTLYING * fitted * self.radius
+        if self._departures.max() > most:
+            contours = tuple(self._explained(c, most) if c.normals is None else c for c in contours)
+        noise, terms = max(noises, default=0.0), self.posterior.polynomial[2:FREE]
+        return bends_of(contours, self.frame, self.radius, noise, terms)
 
     def _explained(self, contour: Contour, most: float) -> Contour:
         """A contour, without those contacts that are off the surface by more than this length."""
@@ -305,7 +314,7 @@ class Reconstruction:
     @property
     def typical_miss(self) -> float:
         """The median of |dz| over the contacts, which outliers do not change."""
-        return float(np.median(self._departures))
+        return median(self._departures.tolist())
 
     @cached_property
     def waves(self) -> float:
@@ -422,7 +431,7 @@ class Reconstruction:
     @cached_property
     def curve_contradiction(self) -> tuple[float, float]:
         """The number of deviations, and the share of L, by which a curve is off what the others show."""
-        if self.method != "bayes":
+        if self.method != "bayes" or len(self.contours) + (len(self.strokes) > 0) < ENOUGH:
             return 0.0, 0.0
         sizes = [int(np.count_nonzero(counted)) for counted in self._off_point]
         curve = np.repeat([*range(len(sizes)), -1], [*sizes, len(self.strokes)])
@@ -433,7 +442,7 @@ class Reconstruction:
     @cached_property
     def curvature_contradiction(self) -> float:
         """The number of deviations by which curvatures are off those of the contacts near the point."""
-        return curvature_contradiction(self.contacts / self.radius, self.posterior, self.curvature_covariance)
+        return curvature_contradiction(self.contacts / self.radius, self.posterior, self._fitted_covariance)
 
     @cached_property
     def _fitted_normals(self) -> tuple[Array, Array]:

@@ -4,7 +4,7 @@
 
 from collections.abc import Sequence
 from itertools import count
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from ..contours.local_geometry import DegenerateCurvesError, Frame
 from ..paper.by_method import coefficients
 from ..patch.domain import Domain, hull_domain
 from ..patch.geometry import Geometry
-from ..patch.monge import HeightField, MongePatch
+from ..patch.monge import TERMS, HeightField, MongePatch, monomials
 from .options import FitOptions
 from .result import Reconstruction
 from .start import Given, Start, away_from, curves_start, domain_of, strokes_start
@@ -61,46 +61,49 @@ def _fit(start: Start, options: FitOptions) -> _Fit:
     if options.method != "bayes" and options.degree != "auto":
         return plain
     given = _observations(start, start.axes, start.radii, contacts)
-    # Short curves are filled up to the length of the longest, and fitting that too would take time.
-    kept = np.argsort(~present, axis=1, kind="stable")[:, : present.sum(axis=1).max()]
-    weights, rows = present.astype(float), np.arange(len(kept))[:, None]
-    normals = given.normals[rows, kept] if given.normals.size else given.normals
-    given = given._replace(contacts=contacts[rows, kept], normals=normals)
-    k1, k2 = start.kappas.T
-    turns, posteriors, found = joint_fit(given, weights[rows, kept], k1, k2)
-    weights[rows, kept] = found
+    weights = present.astype(float)
+    kept: tuple[Any, Any] = slice(None), slice(None)
+    if not present.all():
+        # Short curves are filled up to the length of the longest, and fitting that too would take time.
+        first = np.argsort(~present, axis=1, kind="stable")[:, : present.sum(axis=1).max()]
+        kept = np.arange(len(weights))[:, None], first
+    normals = given.normals[kept] if given.normals.size else given.normals
+    given = given._replace(contacts=contacts[kept], normals=normals)
+    turns, posteriors, weights[kept] = joint_fit(given, weights[kept], *start.kappas.T)
     local = contacts @ turns
+    basis = monomials(local, TERMS)
     if options.degree == "auto":
-        degrees = [posteriors.at(i).degree_shown(local[i][present[i]]) for i in range(len(degrees))]
+        degrees = [posteriors.at(i).degree_shown(basis[i, present[i]]) for i in range(len(degrees))]
     if options.method != "bayes":
         return plain._replace(degrees=degrees)
     joint = plain._replace(axes=start.axes @ turns, contacts=local, degrees=degrees)
-    return _with_processes(start, joint, posteriors, weights)
+    residuals = local[..., 2] - (basis @ posteriors.mean[..., None])[..., 0]
+    return _with_processes(start, joint, posteriors, weights, residuals)
 
 
-def _with_processes(start: Start, fit: _Fit, posteriors: SurfacePosterior, weights: Array) -> _Fit:
-    """The joint fit in unit radius; where evidence favors a process, with it and in its frame."""
+def _with_processes(
+    start: Start, fit: _Fit, posteriors: SurfacePosterior, weights: Array, residuals: Array
+) -> _Fit:
+    """The joint fit in unit radius; where evidence favors a process, with it and in its frame.
+
+    weights, residuals : (b, n), of the contacts
+    """
     points, axes, radii, contacts = fit[:4]
-    offset = np.zeros(len(points))
-    if start.point_stds.any():
-        given = _observations(start, axes, start.radii, contacts)
-        offset = (weights * posteriors.residuals(contacts)).sum(axis=1) / weights.sum(axis=1)
-        offset *= offset_share(weights, given.point_std / np.maximum(given.noise, MISFIT))
-        contacts[..., 2] -= offset[:, None]
-        points = points + (radii * offset)[:, None] * axes[..., 2]
+    given = _observations(start, axes, radii, contacts)
+    offset = (weights * residuals).sum(axis=1) / weights.sum(axis=1)
+    offset *= offset_share(weights, given.point_std / np.maximum(given.noise, MISFIT))
+    contacts[..., 2] -= offset[:, None]
+    points = points + (radii * offset)[:, None] * axes[..., 2]
     # The radius is the distance of the farthest contact of curves, or of strokes where there are no curves.
     places = contacts.shape[1] if start.strokes_only else start.curves.present[0].size
     farthest = np.hypot(contacts[..., 0], contacts[..., 1])[:, :places].max(axis=1)
-    radii, contacts, posteriors, offset = (
-        radii * farthest,
-        contacts / farthest[:, None, None],
-        posteriors.scaled(1.0 / farthest),
-        offset / farthest,
-    )
-    given = _observations(start, axes, radii, contacts)
-    turns, scales, found = process_fit(given, weights, posteriors, start.ranks(), -offset)
+    contacts, offset = contacts / farthest[:, None, None], offset / farthest
+    stds = {"noise": given.noise / farthest, "point_std": given.point_std / farthest}
+    given = given._replace(contacts=contacts, **stds)
+    residuals, posteriors = residuals / farthest[:, None] - offset[:, None], posteriors.scaled(1.0 / farthest)
+    turns, scales, found = process_fit(given, weights, posteriors, residuals, start.ranks, -offset)
     contacts = contacts @ turns / scales[:, None, None]
-    return _Fit(points, axes @ turns, radii * scales, contacts, fit.degrees, found)
+    return _Fit(points, axes @ turns, radii * farthest * scales, contacts, fit.degrees, found)
 
 
 def _observations(start: Start, axes: Array, radii: Array, contacts: Array) -> Observations:

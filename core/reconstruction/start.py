@@ -88,12 +88,12 @@ class Start(NamedTuple):
         present = self.curves.present.reshape(b, -1)
         return np.concatenate([local, strokes], axis=1), np.concatenate([present, there], axis=1)
 
-    def ranks(self) -> NDArray[np.intp]:
-        """How many contacts are farther out on the same half curve, or before it in the strokes, (b, n)."""
-        index, last = np.indices(self.curves.along.shape)[2], self.curves.present.sum(axis=2)[..., None] - 1
-        of_curves = np.where(self.curves.along < 0.0, index, last - index).reshape(len(self.points), -1)
-        of_strokes = np.arange(max(map(len, self.strokes)))[None].repeat(len(self.points), axis=0)
-        return np.concatenate([of_curves, of_strokes], axis=1)
+    def ranks(self, i: int) -> NDArray[np.intp]:
+        """How many of touch i are farther out on the same half curve, or before it in the strokes, (n,)."""
+        along, last = self.curves.along[i], self.curves.present[i].sum(axis=1)[:, None] - 1
+        index = np.arange(along.shape[1])
+        of_curves = np.where(along < 0.0, index, last - index).ravel()
+        return np.append(of_curves, np.arange(max(map(len, self.strokes))))
 
 
 Started = tuple[Start | None, list[list[Contour]], list[DegenerateCurvesError | None]]
@@ -261,7 +261,7 @@ def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
 
     If the surface ended before the first contact of a side, it ends at the point.
     """
-    last = np.maximum(np.count_nonzero(curves.present, axis=1) - 1, 0)
+    last = np.maximum(curves.present.sum(axis=1) - 1, 0)
     rows, ahead = np.arange(len(last)), curves.tangents[:, :2]
     there = curves.present[:, 0]
     sides = np.array([there & (curves.along[:, 0] < 0.0), there & (curves.along[rows, last] > 0.0)])

@@ -83,16 +83,16 @@ def about_taps(taps: Taps | None, is_at_edge: bool, useless: tuple[str, ...]) ->
     yield from beyond("gap", taps.missing, DOUBTFUL_GAP, useless)
 
 
-def about_facets(off: Array, shape: Array) -> Iterator[Doubt]:
+def about_facets(off: Sequence[float], shape: Array) -> Iterator[Doubt]:
     """Whether few facets have other principal curvatures than the shape that they stand for.
 
-    off : (n,), how far those found are off estimates of the shape's; shape : (n, 2), these
+    off : n numbers, how far those found are off estimates of the shape's; shape : (n, 2), these
     """
-    if not len(shape):
+    if not off:
         return
     largest, apart = float(np.abs(shape).max()), float(np.ptp(shape, axis=0).max())
-    if off.min() > max(OFF_SHAPE * largest, DISAGREEING * apart):
-        yield Doubt("facets", float(off.max()) / largest, OFF_SHAPE)
+    if min(off) > max(OFF_SHAPE * largest, DISAGREEING * apart):
+        yield Doubt("facets", max(off) / largest, OFF_SHAPE)
 
 
 def about_point(
@@ -152,14 +152,11 @@ def is_on_flat_face(bent: float, std: float, contours: Sequence[Contour], origin
 
 def _flat_share(contours: Sequence[Contour], origin: Array) -> float:
     """The share of contacts with the normal at the point, on each half curve up to the first other one."""
-    flat = number = 0
-    for contour in contours:
-        if contour.normals is None:
-            continue
-        at = int(np.argmin(np.linalg.norm(contour.points - origin, axis=1)))
-        normals = unit_normals(contour.normals)
-        turns = np.abs(normals @ normals[at]) < FLAT_COSINE
-        for half in (turns[:at][::-1], turns[at + 1 :]):
-            flat += int(np.argmax(np.append(half, True)))
-            number += len(half)
-    return flat / max(number, 1)
+    felt = [(contour.points, contour.normals) for contour in contours if contour.normals is not None]
+    units, flat, start = unit_normals(np.concatenate([np.empty((0, 3)), *(n for _, n in felt)])), 0, 0
+    for points, _ in felt:
+        r, normals, start = points - origin, units[start : start + len(points)], start + len(points)
+        at = int(np.einsum("ni,ni->n", r, r).argmin())
+        turns = (np.abs(normals @ normals[at]) < FLAT_COSINE).tolist()
+        flat += sum([*half, True].index(True) for half in (turns[:at][::-1], turns[at + 1 :]))
+    return flat / max(len(units) - len(felt), 1)

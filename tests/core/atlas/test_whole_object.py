@@ -159,7 +159,6 @@ def test_at_the_point_the_deviation_of_the_bend_is_that_of_the_reconstruction(ri
     r = ring.patches[0]
     bend, std = gaussian_curvature_of(r, r.frame.origin[None])
     assert bend[0] == pytest.approx(r.patch.k1 * r.patch.k2)
-    # That of the reconstruction also contains that the surface bends at few places.
     assert 0.9 * r.gaussian_curvature_std < std[0] < 1.02 * r.gaussian_curvature_std
 
 

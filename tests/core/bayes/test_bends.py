@@ -10,7 +10,7 @@ import pytest
 import surfaces
 
 import core
-from core.bayes.bends import FEW, bends_of
+from core.bayes.bends import FEW, LEAST, bends_of
 
 TOP = 0.2
 
@@ -56,9 +56,21 @@ def test_an_automatic_touch_between_folds_stays_on_its_face(turn):
     assert max(abs(r.k1), abs(r.k2)) * r.radius < 1e-6
 
 
+@pytest.mark.parametrize("angle", [5, 10, 20])
+def test_without_normals_the_deviation_contains_the_curvature_of_folds(angle):
+    """A fold between two contacts is a bend of two chords, which few contacts show from a smooth curve."""
+    rng, sure = np.random.default_rng(angle), 0
+    for r in touches(angle, 24, 1, extent=rng.uniform(0.4, 1.0)):
+        bare = [replace(contour, normals=None) for contour in r.contours]
+        found = core.reconstruct(r.point, bare, outward=(0.0, 0.0, 1.0))
+        assert not is_silent(found)
+        sure += found.status == "ok"
+    assert sure > 0
+
+
 def test_a_touch_across_folds_names_them():
     (r,) = touches(20, 1, 2, extent=1.0)
-    assert r.message.startswith("The surface turns at only one or two places along a curve")
+    assert r.message.startswith("The surface turns at three places or fewer along a curve")
     assert "use a shorter extent, move the point away from folds, or make the facets finer" in r.message
 
 
@@ -72,7 +84,7 @@ def contour(angles, steps):
 def bends(given):
     frame = core.Frame(np.zeros(3), np.eye(3))
     across = [core.Contour(c.points[:, [1, 0, 2]], normals=c.normals[:, [1, 0, 2]]) for c in given]
-    return bends_of([*given, *across], frame, 0.5 * np.ptp(given[0].points[:, 0]), 0.0)
+    return bends_of([*given, *across], frame, 0.5 * np.ptp(given[0].points[:, 0]), 0.0, np.zeros(3))
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -91,7 +103,7 @@ def test_a_single_fold_is_one_bend_whatever_length_and_side_normals_have(scale):
     turned = replace(turned, normals=scale * turned.normals)
     assert found.folded == pytest.approx(0.1)  # 0.2 radians over 2 L
     assert bends([turned]).covariance == pytest.approx(found.covariance)
-    wanted = (FEW / 2.0) ** 3 * 0.1  # There are two bends at least.
+    wanted = (FEW / LEAST) ** 3 * 0.1
     assert 2.0 * math.sqrt(found.covariance[0, 0]) == pytest.approx(wanted, rel=1e-6)
 
 
@@ -126,3 +138,9 @@ def test_facets_around_a_cylinder_are_bends_enough(sections):
     r = core.explore(Prism(), point, normals[0], farthest=1.5).result
     assert r.status == "ok"
     assert (r.k1, r.k2) == pytest.approx((-1.0, 0.0), abs=0.15)
+
+
+def test_few_bends_also_widen_the_deviation_of_gaussian_curvature_along_the_patch():
+    for r in touches(5, 4, 0, extent=0.6):
+        (std,) = core.gaussian_curvature_stds(r, np.zeros(1), np.zeros(1))
+        assert 0.9 < std / r.gaussian_curvature_std < 1.6  # That of z_xy counts as well.

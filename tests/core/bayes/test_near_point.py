@@ -39,6 +39,15 @@ def test_a_touch_across_the_tip_of_a_cone_is_in_doubt_and_a_shorter_one_is_right
     assert np.abs(np.subtract((short.k1, short.k2), true)).max() < 0.1 / short.radius
 
 
+@pytest.mark.parametrize(("slope", "away", "turn"), [(0.19, 0.32, 40), (0.14, 0.31, 25), (0.12, 0.26, 25)])
+def test_the_deviations_of_an_automatic_touch_beside_a_tip_contain_its_curvature(slope, away, turn):
+    surface, planes = cone(slope, away), surfaces.planes((turn, turn + 60, turn + 120))
+    r = core.explore(surface, surface.point, surface.normal, planes, farthest=2.0).result
+    off = np.subtract((r.k1, r.k2), (-slope / away / np.sqrt(1.0 + slope**2), 0.0))
+    assert r.status == "ok"
+    assert (np.abs(off) <= 5.0 * np.array([r.k1_std, r.k2_std])).all()
+
+
 def test_contacts_of_a_sphere_or_a_quartic_agree_with_the_patch():
     quartic = surfaces.graph({(2, 0): -0.02, (0, 2): 0.01, (3, 0): 2e-4, (2, 2): 3e-6})
     for surface, extent in ((surfaces.sphere(25.0), 12.0), (quartic, 10.0)):

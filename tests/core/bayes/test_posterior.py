@@ -342,7 +342,7 @@ def test_a_degree_will_do_whose_patch_departs_by_half_a_deviation(ratio, degree)
     basis = monomials(contacts, TERMS)
     off = basis @ (mean - posterior.coefficients_of(uncertain.patch(4)))
     variance = np.sum(off**2) / ratio**2 / np.sum(basis**2)
-    assert replace(uncertain, root=np.sqrt(variance) * np.eye(28)).degree_shown(contacts) == degree
+    assert replace(uncertain, root=np.sqrt(variance) * np.eye(28)).degree_shown(basis) == degree
 
 
 def test_an_outlying_contact_weighs_as_under_students_distribution():
