@@ -329,17 +329,17 @@ class _Cloud(NamedTuple):
         Its domain is a hull of contacts, which may span what was not felt, such as a notch or a hole, and
         where its heights may run away from the surface.
         """
-        from scipy.spatial import cKDTree
-
         domain = r.domain.radii(AZIMUTHS) / r.radius
-        near = self.same_sheet(i, 2.0 * r.radius)
+        is_mine = np.zeros(len(self.contacts.points), dtype=bool)
+        is_mine[self.same_sheet(i, 2.0 * r.radius)] = True
         shares = np.arange(1, RAY_PLACES + 1) / RAY_PLACES
         turns = 2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
         x, y = r.radius * (shares[:, None, None] * domain[:, None] * ways).reshape(-1, 2).T
         places = r.frame.origin + np.stack([x, y, r.height(x, y)], axis=1) @ r.frame.axes.T
-        away, nearest = cKDTree(self.contacts.points[near]).query(places)
-        empty = (away > BETWEEN * self.contacts.reach[near[nearest]]).reshape(RAY_PLACES, AZIMUTHS)
+        away, nearest = self.tree.query(places)
+        empty = (away > BETWEEN * self.contacts.reach[nearest]) | ~is_mine[nearest]
+        empty = empty.reshape(RAY_PLACES, AZIMUTHS)
         ended = np.where(empty.any(axis=0), empty.argmax(axis=0), RAY_PLACES)
         return domain * np.maximum(ended, 1) / RAY_PLACES
 
