@@ -324,24 +324,32 @@ class _Cloud(NamedTuple):
         return [r if isinstance(r, Reconstruction) else None for r in found]
 
     def rim(self, i: int, r: Reconstruction) -> Array:
-        """The radii (AZIMUTHS,) of a patch, in unit radius, to where it has no contacts near it.
+        """The radii (AZIMUTHS,) of a patch, in unit radius, to where its wall meets another or was not felt.
 
-        Its domain is a hull of contacts, which may span what was not felt, such as a notch or a hole, and
-        where its heights may run away from the surface.
+        Its domain is a hull of contacts, which ends at the last one before an edge, and may span what was not
+        felt, such as a notch or a hole. Beyond an edge the plane of the nearest contact, which is of another
+        wall, is between the patch and the nearest contact of its own wall.
         """
+        from scipy.spatial import cKDTree
+
+        points, own, every = self.contacts.points, self.same_sheet(i, 2.0 * r.radius), np.arange(AZIMUTHS)
         domain = r.domain.radii(AZIMUTHS) / r.radius
-        is_mine = np.zeros(len(self.contacts.points), dtype=bool)
-        is_mine[self.same_sheet(i, 2.0 * r.radius)] = True
-        shares = np.arange(1, RAY_PLACES + 1) / RAY_PLACES
-        turns = 2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
-        ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-        x, y = r.radius * (shares[:, None, None] * domain[:, None] * ways).reshape(-1, 2).T
-        places = r.frame.origin + np.stack([x, y, r.height(x, y)], axis=1) @ r.frame.axes.T
-        away, nearest = self.tree.query(places)
-        empty = (away > BETWEEN * self.contacts.reach[nearest]) | ~is_mine[nearest]
-        empty = empty.reshape(RAY_PLACES, AZIMUTHS)
-        ended = np.where(empty.any(axis=0), empty.argmax(axis=0), RAY_PLACES)
-        return domain * np.maximum(ended, 1) / RAY_PLACES
+        rays = domain + BETWEEN * self.contacts.reach[i] / r.radius
+        rays = rays * np.arange(1, RAY_PLACES + 1)[:, None] / RAY_PLACES
+        turns = 2.0 * np.pi * every / AZIMUTHS
+        x, y = r.radius * (rays * np.stack([np.cos(turns), np.sin(turns)])[:, None]).reshape(2, -1)
+        places = r.frame.to_world(np.stack([x, y, r.height(x, y)], axis=1))
+        away, mine = cKDTree(points[own]).query(places)
+        nearest, mine = self.tree.query(places)[1], own[mine]
+        above, own_above = (
+            row_dot(self.contacts.normals[nearest], some - points[nearest]) for some in (places, points[mine])
+        )
+        is_beyond = (above * own_above < 0.0).reshape(rays.shape)
+        is_end = is_beyond | (away > BETWEEN * self.contacts.reach[mine]).reshape(rays.shape)
+        is_end[-1] = True
+        end = is_end.argmax(axis=0)
+        ends = rays[np.maximum(end - 1, 0), every]
+        return np.where(is_beyond[end, every], ends, np.minimum(ends, domain))
 
     def longest_sure(self, i: int, radii: list[float], last: int) -> tuple[Reconstruction | None, int]:
         """The largest sure patch around contact i, or None; which radius it has.
