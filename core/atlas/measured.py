@@ -309,12 +309,6 @@ class _Cloud(NamedTuple):
         _, piece = connected_pieces(np.nonzero(linked)[0], at[linked], len(near))
         return near[piece == piece[np.flatnonzero(near == i)]]
 
-    def middle(self, i: int, radius: float) -> int:
-        """The contact in the middle of the wall around contact i."""
-        some = self.same_sheet(i, radius)
-        points = self.contacts.points[some]
-        return int(some[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))])
-
     def patches(self, places: Sequence[int], radius: float) -> list[Reconstruction | None]:
         """The patch of those contacts around each place that are of its wall; None where they carry none."""
         points, normals = self.contacts.points[places], self.contacts.normals[places]
@@ -327,8 +321,8 @@ class _Cloud(NamedTuple):
         """The radii (AZIMUTHS,) of a patch, in unit radius, to where its wall meets another or was not felt.
 
         Its domain is a hull of contacts, which ends at the last one before an edge, and may span what was not
-        felt, such as a notch or a hole. Beyond an edge the plane of the nearest contact, which is of another
-        wall, is between the patch and the nearest contact of its own wall.
+        felt, such as a notch or a hole. Beyond an edge the nearest contact is of another wall, and its own
+        wall is on the other side of the plane of that contact, or less than half as far from it.
         """
         from scipy.spatial import cKDTree
 
@@ -344,7 +338,8 @@ class _Cloud(NamedTuple):
         above, own_above = (
             row_dot(self.contacts.normals[nearest], some - points[nearest]) for some in (places, points[mine])
         )
-        is_beyond = (above * own_above < 0.0).reshape(rays.shape)
+        is_beyond = (nearest != mine) & (above * own_above < 0.5 * above**2)
+        is_beyond = is_beyond.reshape(rays.shape)
         is_end = is_beyond | (away > BETWEEN * self.contacts.reach[mine]).reshape(rays.shape)
         is_end[-1] = True
         end = is_end.argmax(axis=0)
@@ -413,16 +408,12 @@ def _patches(cloud: _Cloud, radius: float) -> Generator[float, None, tuple[list[
     for i in range(len(left)):
         if not left[i]:
             continue
-        middle = i
         r, last = cloud.longest_sure(i, radii, last)
-        if r is None:  # At an edge there are no contacts on one side of it.
-            middle = cloud.middle(i, radius)
-            r, last = cloud.longest_sure(middle, radii, last)
         left[cloud.same_sheet(i, MISSING * radius) if r is None else i] = False
         if r is not None:
             found.append(r)
-            tables.append(tabulate(r, cloud.rim(middle, r), deviations=True))
-            chart, some = stacked([r], tables[-1:]), cloud.same_sheet(middle, PATCHES_APART * r.radius)
+            tables.append(tabulate(r, cloud.rim(i, r), deviations=True))
+            chart, some = stacked([r], tables[-1:]), cloud.same_sheet(i, PATCHES_APART * r.radius)
             x, y, _ = chart.local(points[some], np.arange(len(some)), np.zeros(len(some), dtype=np.intp))
             left[some] &= chart.shares(x, y, np.zeros(len(some), dtype=np.intp)) > COVERED
         yield 1.0 - float(left.mean())
