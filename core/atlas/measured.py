@@ -23,6 +23,7 @@ from ..triangles import row_dot
 from ..verdict import Doubt, beyond
 from .charts import AZIMUTHS, Charts
 from .connectivity import Indices, connected_pieces
+from .field import AGREE
 from .finger import FACING
 from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
@@ -321,30 +322,30 @@ class _Cloud(NamedTuple):
         """The radii (AZIMUTHS,) of a patch, in unit radius, to where its wall meets another or was not felt.
 
         Its domain is a hull of contacts, which ends at the last one before an edge, and may span what was not
-        felt, such as a notch or a hole. Beyond an edge the nearest contact is of another wall, and its own
-        wall is on the other side of the plane of that contact, or less than half as far from it.
+        felt, such as a notch or a hole. Beyond an edge the nearest contact is of a wall across it, and its
+        own wall is on the other side of the plane of that contact, or less than half as far from it.
         """
         from scipy.spatial import cKDTree
 
         points, own, every = self.contacts.points, self.same_sheet(i, 2.0 * r.radius), np.arange(AZIMUTHS)
         domain = r.domain.radii(AZIMUTHS) / r.radius
-        rays = domain + BETWEEN * self.contacts.reach[i] / r.radius
-        rays = rays * np.arange(1, RAY_PLACES + 1)[:, None] / RAY_PLACES
+        rays = np.outer(
+            np.linspace(0.0, 1.0, RAY_PLACES + 1)[1:], domain + BETWEEN * self.contacts.reach[i] / r.radius
+        )
         turns = 2.0 * np.pi * every / AZIMUTHS
         x, y = r.radius * (rays * np.stack([np.cos(turns), np.sin(turns)])[:, None]).reshape(2, -1)
         places = r.frame.to_world(np.stack([x, y, r.height(x, y)], axis=1))
         away, mine = cKDTree(points[own]).query(places)
         nearest, mine = self.tree.query(places)[1], own[mine]
-        above, own_above = (
-            row_dot(self.contacts.normals[nearest], some - points[nearest]) for some in (places, points[mine])
-        )
-        is_beyond = (nearest != mine) & (above * own_above < 0.5 * above**2)
-        is_beyond = is_beyond.reshape(rays.shape)
+        normals = self.contacts.normals[nearest]
+        above, own_above = (row_dot(normals, some - points[nearest]) for some in (places, points[mine]))
+        is_other = np.abs(row_dot(normals, self.contacts.normals[mine])) < AGREE
+        is_beyond = (is_other & (above * own_above < 0.5 * above**2)).reshape(rays.shape)
         is_end = is_beyond | (away > BETWEEN * self.contacts.reach[mine]).reshape(rays.shape)
         is_end[-1] = True
         end = is_end.argmax(axis=0)
-        ends = rays[np.maximum(end - 1, 0), every]
-        return np.where(is_beyond[end, every], ends, np.minimum(ends, domain))
+        last = rays[np.maximum(end - 1, 0), every]
+        return np.where(is_beyond[end, every], last, np.minimum(last, domain))
 
     def longest_sure(self, i: int, radii: list[float], last: int) -> tuple[Reconstruction | None, int]:
         """The largest sure patch around contact i, or None; which radius it has.
