@@ -39,6 +39,8 @@ WIDENING, WIDENINGS = 1.4, 10  # Patches grow by this factor, at most this often
 # than the third, up to which a patch reaches. Contacts within the second share of the least radius of one
 # without a patch carry none either: otherwise a patch bulges to a single contact that is off (test_measured).
 PATCHES_APART, MISSING, COVERED = 0.6, 0.6, 1.0
+# A patch goes on to an edge within this share of a neighbor's reach from a contact: with 1.5 rounded cubes of
+AT_EDGE = 0.5  # 800 contacts without normals have spikes of a tenth of their size.
 RAY_PLACES = 24  # Where a patch ends is looked for at this many places on each ray.
 ABREAST = 8  # The number of neighbors of each contact that are to face the same way.
 SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
@@ -267,9 +269,14 @@ def _doubts_of_contacts(
     """
     if not far.any() or (far.mean() <= FEW and len(worst) <= len(QUADRIC)):
         return []
-    words = f"{np.count_nonzero(far)} of {len(far)} contacts", place_text(contacts.points[worst[:1]])
     code = "confused" if is_turned[worst].any() else "off_surface"
-    return [Doubt(code, float(distances[far].max()), words=words)]
+    return [
+        Doubt(
+            code,
+            float(distances[far].max()),
+            words=(f"{np.count_nonzero(far)} of {len(far)} contacts", place_text(contacts.points[worst[:1]])),
+        )
+    ]
 
 
 def _agreement(
@@ -323,7 +330,8 @@ class _Cloud(NamedTuple):
 
         Its domain is a hull of contacts, which ends at the last one before an edge, and may span what was not
         felt, such as a notch or a hole. Beyond an edge the nearest contact is of a wall across it, and its
-        own wall is on the other side of the plane of that contact, or less than half as far from it.
+        own wall is on the other side of the plane of that contact, or less than half as far from it. The
+        patch goes on beyond its domain only to an edge that is near a contact.
         """
         from scipy.spatial import cKDTree
 
@@ -336,7 +344,7 @@ class _Cloud(NamedTuple):
         x, y = r.radius * (rays * np.stack([np.cos(turns), np.sin(turns)])[:, None]).reshape(2, -1)
         places = r.frame.to_world(np.stack([x, y, r.height(x, y)], axis=1))
         away, mine = cKDTree(points[own]).query(places)
-        nearest, mine = self.tree.query(places)[1], own[mine]
+        (to_any, nearest), mine = self.tree.query(places), own[mine]
         normals = self.contacts.normals[nearest]
         above, own_above = (row_dot(normals, some - points[nearest]) for some in (places, points[mine]))
         is_other = np.abs(row_dot(normals, self.contacts.normals[mine])) < AGREE
@@ -345,7 +353,8 @@ class _Cloud(NamedTuple):
         is_end[-1] = True
         end = is_end.argmax(axis=0)
         last = rays[np.maximum(end - 1, 0), every]
-        return np.where(is_beyond[end, every], last, np.minimum(last, domain))
+        is_edge = is_beyond & (to_any < AT_EDGE * self.contacts.reach[nearest]).reshape(rays.shape)
+        return np.where(is_edge[end, every], last, np.minimum(last, domain))
 
     def longest_sure(self, i: int, radii: list[float], last: int) -> tuple[Reconstruction | None, int]:
         """The largest sure patch around contact i, or None; which radius it has.
