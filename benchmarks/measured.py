@@ -15,9 +15,9 @@ parallel planes, seeded. It prints Markdown tables:
 (b) with `--orientation`, every object of benchmarks.atlas_shapes, with gaps between strokes below half its
     thinnest wall, and 1.8 times as long: the share of contacts whose normals face outward, and the doubt. Of
     longer gaps it is that of the whole object if many normals are wrong without one of their own;
-(c) with `--features`, dents, bumps, grooves and steps of five heights from 10 to 100 noises on three objects:
-    the verdict, the share of the contacts in the feature that are off by more than five deviations and
-    noises, their mean distance in noises, and that of the others.
+(c) with `--features`, dents, bumps, grooves and steps of five heights from 10 to 100 noises on three objects,
+    along the ways from their middles: the verdict, the share of the contacts in the feature that are off by
+    more than five deviations and noises, their mean distance in noises, and that of the others.
 """
 
 import argparse
@@ -29,6 +29,7 @@ import numpy as np
 
 import core
 from core.atlas.orientation import doubts_of, oriented, planes_of
+from core.triangles import normalized
 from tools import blender
 
 from . import machine, table
@@ -282,9 +283,11 @@ def print_features(only, first):
         for seed, (kind, noises) in enumerate(product(WIDTHS, HEIGHTS), start=first):
             rng = np.random.default_rng(seed)
             strokes = strokes_of(thing, rng.uniform(*GAPS), rng)
-            points, normals = (np.vstack(values) for values in zip(*strokes, strict=True))
+            points = np.vstack([p for p, _ in strokes])
+            # Along normals, two walls would pass through each other at an edge, or leave a gap there.
+            ways = normalized(points - thing.vertices.mean(axis=0))
             height, inside = profile(kind, points, points[rng.integers(len(points))], rotation(rng)[0])
-            felt = points + noises * NOISE * height[:, None] * normals + rng.normal(0.0, NOISE, points.shape)
+            felt = points + noises * NOISE * height[:, None] * ways + rng.normal(0.0, NOISE, points.shape)
             start = process_time()
             atlas = core.atlas_of(np.split(felt, np.cumsum([len(p) for p, _ in strokes])[:-1]), noise=NOISE)
             seconds = process_time() - start

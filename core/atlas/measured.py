@@ -23,6 +23,7 @@ from ..triangles import row_dot
 from ..verdict import Doubt, beyond
 from .charts import AZIMUTHS, Charts
 from .connectivity import Indices, connected_pieces
+from .field import AGREE
 from .finger import FACING
 from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
@@ -38,6 +39,8 @@ WIDENING, WIDENINGS = 1.4, 10  # Patches grow by this factor, at most this often
 # than the third, up to which a patch reaches. Contacts within the second share of the least radius of one
 # without a patch carry none either: otherwise a patch bulges to a single contact that is off (test_measured).
 PATCHES_APART, MISSING, COVERED = 0.6, 0.6, 1.0
+# A patch goes on to an edge where a contact is within this share of its neighbors' reach: without this limit,
+AT_EDGE = 0.5  # a rounded cube of 800 even contacts without normals has a spike of a tenth of its size.
 RAY_PLACES = 24  # Where a patch ends is looked for at this many places on each ray.
 ABREAST = 8  # The number of neighbors of each contact that are to face the same way.
 SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
@@ -266,9 +269,14 @@ def _doubts_of_contacts(
     """
     if not far.any() or (far.mean() <= FEW and len(worst) <= len(QUADRIC)):
         return []
-    words = f"{np.count_nonzero(far)} of {len(far)} contacts", place_text(contacts.points[worst[:1]])
     code = "confused" if is_turned[worst].any() else "off_surface"
-    return [Doubt(code, float(distances[far].max()), words=words)]
+    return [
+        Doubt(
+            code,
+            float(distances[far].max()),
+            words=(f"{np.count_nonzero(far)} of {len(far)} contacts", place_text(contacts.points[worst[:1]])),
+        )
+    ]
 
 
 def _agreement(
@@ -281,10 +289,10 @@ def _agreement(
     """How contacts (n,) agree with the surface if there is no doubt; `noise` is that of the fit, or 0."""
     message = "The surface is closed, and all contacts agree with it."
     if far.any():
-        most, where = distances[far].max(), place_text(contacts.points[worst[:1]])
         message = (
             f"The surface is closed. All but {np.count_nonzero(far)} of {len(far)} contacts agree with it, "
-            f"which are off by up to {most:.2g}, most together around {where}."
+            f"which are off by up to {distances[far].max():.2g}, most together around "
+            f"{place_text(contacts.points[worst[:1]])}."
         )
     if noise:
         message += f" No noise was given; that of the fit is {noise:.2g}."
@@ -309,12 +317,6 @@ class _Cloud(NamedTuple):
         _, piece = connected_pieces(np.nonzero(linked)[0], at[linked], len(near))
         return near[piece == piece[np.flatnonzero(near == i)]]
 
-    def middle(self, i: int, radius: float) -> int:
-        """The contact in the middle of the wall around contact i."""
-        some = self.same_sheet(i, radius)
-        points = self.contacts.points[some]
-        return int(some[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))])
-
     def patches(self, places: Sequence[int], radius: float) -> list[Reconstruction | None]:
         """The patch of those contacts around each place that are of its wall; None where they carry none."""
         points, normals = self.contacts.points[places], self.contacts.normals[places]
@@ -324,24 +326,35 @@ class _Cloud(NamedTuple):
         return [r if isinstance(r, Reconstruction) else None for r in found]
 
     def rim(self, i: int, r: Reconstruction) -> Array:
-        """The radii (AZIMUTHS,) of a patch, in unit radius, to where it has no contacts near it.
+        """The radii (AZIMUTHS,) of a patch, in unit radius, to where its wall meets another or was not felt.
 
-        Its domain is a hull of contacts, which may span what was not felt, such as a notch or a hole, and
-        where its heights may run away from the surface.
+        Its domain is a hull of contacts, which ends at the last one before an edge, and may span what was not
+        felt, such as a notch or a hole. Beyond an edge the nearest contact is of a wall across it, and its
+        own wall is on the other side of the plane of that contact, or less than half as far from it. The
+        patch goes on beyond its domain only to an edge that is near a contact.
         """
         from scipy.spatial import cKDTree
 
+        points, own, every = self.contacts.points, self.same_sheet(i, 2.0 * r.radius), np.arange(AZIMUTHS)
         domain = r.domain.radii(AZIMUTHS) / r.radius
-        near = self.same_sheet(i, 2.0 * r.radius)
-        shares = np.arange(1, RAY_PLACES + 1) / RAY_PLACES
-        turns = 2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
-        ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-        x, y = r.radius * (shares[:, None, None] * domain[:, None] * ways).reshape(-1, 2).T
-        places = r.frame.origin + np.stack([x, y, r.height(x, y)], axis=1) @ r.frame.axes.T
-        away, nearest = cKDTree(self.contacts.points[near]).query(places)
-        empty = (away > BETWEEN * self.contacts.reach[near[nearest]]).reshape(RAY_PLACES, AZIMUTHS)
-        ended = np.where(empty.any(axis=0), empty.argmax(axis=0), RAY_PLACES)
-        return domain * np.maximum(ended, 1) / RAY_PLACES
+        rays = np.outer(
+            np.linspace(0.0, 1.0, RAY_PLACES + 1)[1:], domain + BETWEEN * self.contacts.reach[i] / r.radius
+        )
+        turns = 2.0 * np.pi * every / AZIMUTHS
+        x, y = r.radius * (rays * np.stack([np.cos(turns), np.sin(turns)])[:, None]).reshape(2, -1)
+        places = r.frame.to_world(np.stack([x, y, r.height(x, y)], axis=1))
+        away, mine = cKDTree(points[own]).query(places)
+        (to_any, nearest), mine = self.tree.query(places), own[mine]
+        normals = self.contacts.normals[nearest]
+        above, own_above = (row_dot(normals, some - points[nearest]) for some in (places, points[mine]))
+        is_other = np.abs(row_dot(normals, self.contacts.normals[mine])) < AGREE
+        is_beyond = (is_other & (above * own_above < 0.5 * above**2)).reshape(rays.shape)
+        is_end = is_beyond | (away > BETWEEN * self.contacts.reach[mine]).reshape(rays.shape)
+        is_end[-1] = True
+        end = is_end.argmax(axis=0)
+        last = rays[np.maximum(end - 1, 0), every]
+        is_edge = is_beyond & (to_any < AT_EDGE * self.contacts.reach[nearest]).reshape(rays.shape)
+        return np.where(is_edge[end, every], last, np.minimum(last, domain))
 
     def longest_sure(self, i: int, radii: list[float], last: int) -> tuple[Reconstruction | None, int]:
         """The largest sure patch around contact i, or None; which radius it has.
@@ -405,16 +418,12 @@ def _patches(cloud: _Cloud, radius: float) -> Generator[float, None, tuple[list[
     for i in range(len(left)):
         if not left[i]:
             continue
-        middle = i
         r, last = cloud.longest_sure(i, radii, last)
-        if r is None:  # At an edge there are no contacts on one side of it.
-            middle = cloud.middle(i, radius)
-            r, last = cloud.longest_sure(middle, radii, last)
         left[cloud.same_sheet(i, MISSING * radius) if r is None else i] = False
         if r is not None:
             found.append(r)
-            tables.append(tabulate(r, cloud.rim(middle, r), deviations=True))
-            chart, some = stacked([r], tables[-1:]), cloud.same_sheet(middle, PATCHES_APART * r.radius)
+            tables.append(tabulate(r, cloud.rim(i, r), deviations=True))
+            chart, some = stacked([r], tables[-1:]), cloud.same_sheet(i, PATCHES_APART * r.radius)
             x, y, _ = chart.local(points[some], np.arange(len(some)), np.zeros(len(some), dtype=np.intp))
             left[some] &= chart.shares(x, y, np.zeros(len(some), dtype=np.intp)) > COVERED
         yield 1.0 - float(left.mean())

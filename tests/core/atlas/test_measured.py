@@ -7,9 +7,11 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 import core
 from core.atlas import measured
+from core.atlas.charts import AZIMUTHS
 from tests import solids
 
 
@@ -157,6 +159,49 @@ def test_a_gap_that_is_narrower_than_strokes_are_apart_is_a_doubt_that_names_it(
         assert atlas.status == "uncertain"
         assert "where strokes are farther apart than half of the wall or gap" in atlas.message
         assert np.linalg.norm(atlas.next_touch().point - np.array([0.51, 0.0, 0.0])) < 0.2
+
+
+def rectangle(corner, one, two, spacing=0.04):
+    """Contacts inside a rectangle, half a spacing from its sides, and its normals."""
+    a, b = (
+        (np.arange(round(np.linalg.norm(side) / spacing)) + 0.5) * spacing / np.linalg.norm(side)
+        for side in (one, two)
+    )
+    points = np.array(corner) + a[:, None, None] * np.array(one) + b[:, None] * np.array(two)
+    normal = np.cross(one, two) / np.linalg.norm(np.cross(one, two))
+    return points.reshape(-1, 3), np.tile(normal, (points.size // 3, 1))
+
+
+@cache
+def angle_atlas():
+    """The atlas of an L of width .4 with contacts on each wall up to .02 from its edges."""
+    x, y, z = np.eye(3)
+    polygon = np.array([(0, 0, 0), (1, 0, 0), (1, 0.4, 0), (0.4, 0.4, 0), (0.4, 1, 0), (0, 1, 0)])
+    walls = [rectangle(a, b - a, 0.4 * z) for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True)]
+    for corner, long, wide in ((polygon[0], x, 0.4 * y), (0.4 * y, 0.4 * x, 0.6 * y)):
+        walls += [rectangle(corner + 0.4 * z, long, wide), rectangle(corner, wide, long)]
+    points, normals = (np.vstack(values) for values in zip(*walls, strict=True))
+    points += np.random.default_rng(0).normal(0.0, 5e-4, points.shape)
+    return core.atlas_of([core.Contour(points, normals=normals)], noise=5e-4)
+
+
+def test_no_patch_spans_a_notch_whose_walls_were_felt():
+    atlas, along = angle_atlas(), np.linspace(0.005, 0.395, 40)[:, None] * (0.0, 0.0, 1.0)
+    assert atlas.status == "ok"
+    for out in (0.0, 0.03, 0.06, 0.1):
+        distance, _ = atlas.distance(np.array([0.4 + out, 0.4 + out, 0.0]) + along)
+        assert distance == pytest.approx(np.full(40, out), abs=2e-3)
+
+
+def test_a_patch_goes_on_from_its_last_contact_to_the_edge_of_its_wall():
+    contacts = angle_atlas().contacts
+    tree = cKDTree(contacts.points)
+    cloud, (_, i) = measured._Cloud(contacts, tree, 5e-4, None), tree.query((0.1, 0.3, 0.4))
+    (r,) = cloud.patches([i], 0.15)
+    toward_edge = np.array([-1.0, 0.0, 0.0]) @ r.frame.axes
+    turn = np.arctan2(toward_edge[1], toward_edge[0]) / (2.0 * np.pi)
+    rim = r.radius * cloud.rim(i, r)[round(turn * AZIMUTHS) % AZIMUTHS]
+    assert rim == pytest.approx(contacts.points[i, 0], abs=0.005)
 
 
 def test_a_noise_that_was_not_given_is_named():
