@@ -40,8 +40,8 @@ WIDENING, WIDENINGS = 1.4, 10  # Patches grow by this factor, at most this often
 # without a patch carry none either: otherwise a patch bulges to a single contact that is off (test_measured).
 PATCHES_APART, MISSING, COVERED = 0.6, 0.6, 1.0
 # A patch goes on to an edge where a contact is within this share of its neighbors' reach: with 0.3 an L whose
-# contacts end half a spacing before its edges is in doubt (test_measured), with 0.5 a pear of 400 even contacts
-AT_EDGE = 0.45  # has a spike of a twentieth of its size.
+# contacts end half a spacing before its edges is in doubt (test_measured), with 0.5 a pear of 400 even
+AT_EDGE = 0.45  # contacts has a spike of a twentieth of its size.
 RAY_PLACES = 24  # Where a patch ends is looked for at this many places on each ray.
 ABREAST = 8  # The number of neighbors of each contact that are to face the same way.
 SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
