@@ -59,11 +59,13 @@ class ExplorationOptions:
     def __post_init__(self) -> None:
         generator_of(self.rng)
         _ = self.fit
-        extent = _length("extent", self.extent)
+        extent, step = _length("extent", self.extent), _length("step", self.step)
+        if extent and step and step > extent:
+            raise ValueError(f"step: expected no more than the extent {extent:g}, got {step:g}")
         vars(self).update(  # __setattr__ of a frozen dataclass raises.
             planes=planes_of(self.planes),
             extent=extent,
-            step=_length("step", self.step),
+            step=step,
             farthest=extent or _length("farthest", self.farthest),
             largest_std=_length("largest_std", self.largest_std),
             tolerance=None if self.tolerance is None else number("tolerance", self.tolerance, least=0.0),

@@ -8,12 +8,12 @@ from scipy.ndimage import label
 
 import core
 from core.atlas.connectivity import split_sides
-from core.atlas.dual_contouring import _held, dual_contour
+from core.atlas.dual_contouring import _held, _sides, dual_contour
 from core.atlas.indicator import Indicator
 from core.atlas.join import charts_of
 from core.atlas.lattice import CORNERS, Lattice, _cases, composed, lattice_at_level, turned
 from core.steps import result_of
-from tests import solids
+from tests import solids, surfaces
 
 BLOCK = solids.block()
 
@@ -48,6 +48,17 @@ def test_without_patches_the_level_of_the_indicator_is_closed_at_any_pitch(far, 
     assert (found.patch == -1).all() and np.isinf(found.rho).all()
     out = np.linalg.norm(found.vertices - 0.05 * 23, axis=1)
     assert np.abs(out - 0.1 * 0.35 * 24).max() < 0.7 * pitch + 0.02
+
+
+def test_a_patch_alone_has_no_sides_beyond_its_rim():
+    """Beyond an edge its wall goes on inside of nothing: points there would stand out of the edge."""
+    s = surfaces.plane()
+    r = core.explore(s, s.point, s.normal, extent=1.0).result
+    charts = charts_of([r])
+    (x, y), _ = charts.rim_at(np.array([0, 1])).T
+    out = np.array([0.9, 1.01, 1.05, 1.11])
+    places = r.frame.to_world(r.radius * np.outer(out, (x, y, 0.0)) - [0.0, 0.0, 0.01])
+    assert _sides(charts, 0.1, 0.1, 0.15, places)[-1].tolist() == [-1.0, 0.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("seed", range(3))

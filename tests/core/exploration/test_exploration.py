@@ -441,6 +441,7 @@ def test_nothing_is_felt_twice():
         ({"step": -1.0}, "step: expected a finite number above 0, got -1"),
         ({"farthest": 0.0}, "farthest: expected a finite number above 0, got 0"),
         ({"step": 40.0}, "step: expected no more than the extent 30, got 40"),
+        ({"extent": 1.0, "step": 2.0}, "step: expected no more than the extent 1, got 2"),
         ({"method": "magic", "extent": 8.0}, "method: expected one of .*, got 'magic'"),
     ],
 )
