@@ -133,15 +133,20 @@ def _sides(charts: Charts, cell: float, pitch: float, band: float, places: Array
     pairs, count = charts.pairs(places, band), len(places)
     every, side, found = nearest_sheet(charts, pairs, count), np.zeros(count), []
     distances, away = distances_within_rims(charts, pairs), np.full(count, np.inf)
-    is_felt = pairs.rho < INSIDE
-    np.minimum.at(away, pairs.point_index[is_felt], distances[is_felt])
+    np.minimum.at(away, pairs.point_index, distances)
+    sums = [
+        np.bincount(pairs.point_index, column, count) for column in (np.ones(len(distances)), *pairs.normal.T)
+    ]
+    # Beyond the rims of all there is a side where walls meet, but none of one wall alone.
+    has_side = np.linalg.norm(sums[1:], axis=0) < FACING * sums[0]
+    has_side[pairs.point_index[pairs.rho < INSIDE]] = True
     is_near = distances <= away[pairs.point_index] + AS_NEAR * pitch
     for way in (-1.0, 1.0):
         is_there = np.sign(pairs.distance) == way
         side += way * (np.bincount(pairs.point_index[is_there], minlength=count) > 0)
         sheet = nearest_sheet(charts, pairs.chosen(is_there & is_near), count)
         found += [*sheet.where((sheet.patch >= 0) & (every.distance * way <= 0.0), every)]
-    return *found, np.where(away < cell, side, 0.0)
+    return *found, np.where(has_side & (away < cell), side, 0.0)
 
 
 def _planes(lattice: Lattice, sides: Sides, edges: Indices) -> tuple[Array, Blend]:
