@@ -18,7 +18,7 @@ from ..touch.types import Array, Point
 
 WITHIN = 0.05  # The mesh is looked for along the normal within this share of its size.
 PLACES, SEED = 10_000, 0  # The number of places on the faces of each, and the most vertices, to compare.
-STARTS = 12  # From so many of them the farthest place of all is looked for, as in `_climb`,
+STARTS = 24  # From so many of them the farthest place of all is looked for, as in `_climb`,
 MOVES = 20  # by so many moves, half as long after each that would lead back.
 AT_ONCE, BACK_AT_ONCE = 1000, 300  # The number of places of the surface, or of the mesh, for a step.
 FACES_AT_ONCE = 10_000  # The most faces in a tree, because making a larger one takes too long for a step.
