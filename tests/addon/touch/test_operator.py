@@ -430,6 +430,11 @@ def zero_scale(bpy):
     bpy.context.object.scale.y = 0.0
 
 
+def flattened(bpy):
+    """Single precision does not hold the inverse of this transform: a probe would never be at rest."""
+    bpy.context.object.scale = (1.0, 1.0, 1e-7)
+
+
 def huge(bpy):
     bpy.context.object.scale = (3e38, 3e38, 3e38)
 
@@ -489,6 +494,7 @@ def nothing(bpy):
         (no_faces, {}, '"Sphere" has no faces to touch'),
         (bad_vertex, {}, "vertices whose coordinates are not finite, 1 of 8066: delete them"),
         (zero_scale, {}, "a scale of 0 in some direction"),
+        (flattened, {}, "or 1e+06 times less than in another"),
         (huge, {}, "reaches farther than 1e+15 from the origin"),
         (one_vertex_far_away, {}, "reaches farther than 1e+15 from the origin"),
         (disabled, {}, "disabled in viewports or excluded from the view layer"),
