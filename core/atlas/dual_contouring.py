@@ -44,7 +44,8 @@ class Sides(NamedTuple):
 
     points : (n,), in order
     inside, outside : the nearest sheets; if these put them elsewhere, those about as near that put them there
-    side : (n,), -1 or 1 if patches put them inside or outside, and no patch near denies it; otherwise 0
+    side : (n,), -1 or 1 if patches put them inside or outside, and no patch near denies it; otherwise
+        0, and also beyond the rim of a single wall
     """
 
     points: Indices
@@ -134,11 +135,10 @@ def _sides(charts: Charts, cell: float, pitch: float, band: float, places: Array
     every, side, found = nearest_sheet(charts, pairs, count), np.zeros(count), []
     distances, away = distances_within_rims(charts, pairs), np.full(count, np.inf)
     np.minimum.at(away, pairs.point_index, distances)
-    sums = [
-        np.bincount(pairs.point_index, column, count) for column in (np.ones(len(distances)), *pairs.normal.T)
-    ]
-    # Beyond the rims of all there is a side where walls meet, but none of one wall alone.
-    has_side = np.linalg.norm(sums[1:], axis=0) < FACING * sums[0]
+    number = np.bincount(pairs.point_index, minlength=count)
+    up = [np.bincount(pairs.point_index, column, count) for column in pairs.normal.T]
+    # Beyond the rims of all patches there is a side where walls meet, but none of a single wall.
+    has_side = np.linalg.norm(up, axis=0) < FACING * number
     has_side[pairs.point_index[pairs.rho < INSIDE]] = True
     is_near = distances <= away[pairs.point_index] + AS_NEAR * pitch
     for way in (-1.0, 1.0):

@@ -270,14 +270,9 @@ def _doubts_of_contacts(
     """
     if not far.any() or (far.mean() <= FEW and len(worst) <= len(QUADRIC)):
         return []
+    words = f"{np.count_nonzero(far)} of {len(far)} contacts", place_text(contacts.points[worst[:1]])
     code = "confused" if is_turned[worst].any() else "off_surface"
-    return [
-        Doubt(
-            code,
-            float(distances[far].max()),
-            words=(f"{np.count_nonzero(far)} of {len(far)} contacts", place_text(contacts.points[worst[:1]])),
-        )
-    ]
+    return [Doubt(code, float(distances[far].max()), words=words)]
 
 
 def _agreement(
@@ -290,10 +285,10 @@ def _agreement(
     """How contacts (n,) agree with the surface if there is no doubt; `noise` is that of the fit, or 0."""
     message = "The surface is closed, and all contacts agree with it."
     if far.any():
+        most, where = distances[far].max(), place_text(contacts.points[worst[:1]])
         message = (
             f"The surface is closed. All but {np.count_nonzero(far)} of {len(far)} contacts agree with it, "
-            f"which are off by up to {distances[far].max():.2g}, most together around "
-            f"{place_text(contacts.points[worst[:1]])}."
+            f"which are off by up to {most:.2g}, most together around {where}."
         )
     if noise:
         message += f" No noise was given; that of the fit is {noise:.2g}."

@@ -127,7 +127,7 @@ def _angles(normals: Array, toward: Array, curve: NDArray[np.intp]) -> Array:
 def _chords(
     curve: NDArray[np.intp], along: Array, heights: Array, noise: float
 ) -> tuple[NDArray[np.intp], Array, Array, Array]:
-    """Of the chords between contacts (n,) in order: curves, middles, angles and their deviations, (m,)."""
+    """Curves, middles, angles and their deviations, (m,), of the chords between contacts (n,) in order."""
     last = np.bincount(curve) - 1
     if last.max() > CHORDS:
         rank, last = np.arange(len(curve)) - curve.searchsorted(curve), last[curve]

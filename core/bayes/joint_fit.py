@@ -108,7 +108,7 @@ def _first_axes(contacts: Array, weights: Array, k1: Array, k2: Array) -> Array:
     a plane they are toward the farthest contact.
     """
     axes = np.eye(3)[None].repeat(len(contacts), axis=0)
-    for i in (k2 - k1 <= 2.0 * UMBILIC * np.maximum(1.0, np.abs(k1))).nonzero()[0]:
+    for i in np.flatnonzero(k2 - k1 <= 2.0 * UMBILIC * np.maximum(1.0, np.abs(k1))):
         away = np.hypot(contacts[i, :, 0], contacts[i, :, 1]) * weights[i]
         heights = (np.abs(contacts[i, :, 2]) * weights[i]).round(DECIMALS)
         chosen = np.argmax(heights if heights.any() else away.round(DECIMALS))
@@ -192,7 +192,7 @@ def posteriors_of(
 def _student_weights(residuals: Array, present: NDArray[np.bool_], floor: Array) -> Array:
     """Weights of the contacts, (b, n): all 1 if none of a touch is outlying, 0 where there is no contact."""
     misses, found = np.abs(residuals), present.astype(float)
-    for i in (present & (misses > OUTLYING * floor[:, None])).any(axis=1).nonzero()[0]:
+    for i in np.flatnonzero((present & (misses > OUTLYING * floor[:, None])).any(axis=1)):
         ratios = misses[i] / max(floor[i], 1.4826 * float(np.median(misses[i][present[i]])))
         if ratios[present[i]].max() > OUTLYING:
             found[i] *= (STUDENT + 1.0) / (STUDENT + ratios**2)

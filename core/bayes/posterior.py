@@ -222,7 +222,7 @@ class SurfacePosterior(HeightField):
         left = basis @ self.root[:, :-1].T
         variance = np.einsum("ni,ni->", left, left)
         off = basis[:, FREE:] @ (_departures() @ self.polynomial[FREE:]).T
-        enough = (np.einsum("nk,nk->k", off, off) <= 0.25 * variance).nonzero()[0]
+        enough = np.flatnonzero(np.einsum("nk,nk->k", off, off) <= 0.25 * variance)
         return LEAST_DEGREE + int(enough[0]) if len(enough) else DEGREE
 
     def turn(self, confidence: float = CONFIDENCE) -> float:

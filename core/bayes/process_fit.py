@@ -88,7 +88,7 @@ def process_fit(
     turns, scales, found = np.eye(3)[None].repeat(b, axis=0), np.ones(b), [posterior.at(i) for i in range(b)]
     off, most = np.abs(residuals), np.maximum(posterior.noise, least)
     rms = np.sqrt((weights * off**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0))
-    for i in (rms > UNEXPLAINED_MISFIT * least).nonzero()[0]:
+    for i in np.flatnonzero(rms > UNEXPLAINED_MISFIT * least):
         there = np.flatnonzero(weights[i])
         touch = _with_point(given, weights[i], ranks(int(i)), float(offsets[i]), int(i))
         carried = touch.at_places()

@@ -159,7 +159,7 @@ def misses(curves: Curves) -> Array:
     local, stds = local_curves(curves)
     foot = local[..., 0, :]
     across = foot - np.einsum("...i,...i->...", foot, curves.tangents)[..., None] * curves.tangents
-    return np.stack([np.sqrt(np.einsum("...i,...i->...", across, across)), stds], axis=-1)
+    return np.stack([np.linalg.norm(across, axis=-1), stds], axis=-1)
 
 
 def _parabola(s: Array, r: Array) -> tuple[Array, Array]:

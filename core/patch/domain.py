@@ -237,7 +237,7 @@ def closed_spline_domain(ends: ArrayLike, radius: float, open_ends: ArrayLike | 
     """
     x, y = np.asarray(ends, dtype=float).T
     is_open = np.zeros(len(x), dtype=bool) if open_ends is None else np.asarray(open_ends, dtype=bool)
-    out = (x * x + y * y > (SAME_END * radius) ** 2).nonzero()[0]
+    out = np.flatnonzero(x * x + y * y > (SAME_END * radius) ** 2)
     order = out[np.argsort(np.arctan2(y[out], x[out]), kind="stable")]
     x, y, is_open = x[order], y[order], is_open[order]
     before = np.arange(-1, len(x) - 1)

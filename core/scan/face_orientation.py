@@ -85,7 +85,7 @@ def _sides_of(points: Array, corners: Indices, starts: Indices) -> _Sides:
 
 
 def _first_in_place(points: Array) -> Indices:
-    """The first vertex (n,) that is in the place of each."""
+    """The first vertex (n,) that is in the place of each, by less memory than np.unique takes."""
     order = np.lexsort(points.T)
     placed = points[order]
     is_new = np.append(True, (placed[1:] != placed[:-1]).any(axis=1))

@@ -14,9 +14,7 @@ from .arrays import read_array
 from .types import Array, Object, Point, Triple
 
 SHORT_SHARE = 0.05  # In most cases the mesh is within this share of the reach.
-FLATTEST = (
-    1e6  # Scales along the axes of an object differ by less, so that single precision holds its inverse.
-)
+FLATTEST = 1e6  # Scales along an object's axes differ by less, so that single precision holds its inverse.
 FARTHEST_VERTEX = 1e15  # Vertices are no farther away, so that single precision can hold squared distances.
 
 

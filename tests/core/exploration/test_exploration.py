@@ -201,7 +201,7 @@ def test_next_to_an_edge_few_touches_are_tried(monkeypatch):
 
 
 def test_at_the_edge_of_a_small_disk_a_touch_is_in_doubt_and_not_refused():
-    """Of every length half curves end at the point, and of the greatest ones there is no contact at all."""
+    """Half curves of every length end at the point, and the longest ones have no contact at all."""
 
     class Disk:
         def ray_cast(self, *ray):
