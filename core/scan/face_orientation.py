@@ -70,7 +70,8 @@ def open_edge_distance(points: Array, corners: Indices, starts: Indices, place: 
 
 
 def _sides_of(points: Array, corners: Indices, starts: Indices) -> _Sides:
-    start = _first_in_place(points)[corners]
+    _, first, same = np.unique(points, axis=0, return_index=True, return_inverse=True)
+    start = first.astype(np.int32)[same.ravel()[corners]]
     lengths, end = np.diff(starts, append=len(corners)), np.roll(start, -1)
     end[starts + lengths - 1] = start[starts]
     face, proper = np.repeat(np.arange(len(starts), dtype=np.int32), lengths), start != end
@@ -82,16 +83,6 @@ def _sides_of(points: Array, corners: Indices, starts: Indices) -> _Sides:
     count = np.diff(begin, append=len(order))
     two = begin[count == 2]
     return _Sides(start, end, face, order[begin[count == 1]], np.column_stack([order[two], order[two + 1]]))
-
-
-def _first_in_place(points: Array) -> Indices:
-    """The first vertex (n,) that is in the place of each, by less memory than np.unique takes."""
-    order = np.lexsort(points.T)
-    placed = points[order]
-    is_new = np.append(True, (placed[1:] != placed[:-1]).any(axis=1))
-    first = np.empty(len(points), dtype=np.int32)
-    first[order] = order[is_new][np.cumsum(is_new) - 1]
-    return first
 
 
 def _parts(rows: Array | Indices) -> Iterator[slice]:
