@@ -28,6 +28,31 @@ def triangle_cross(triangles: Array) -> Array:
     return np.cross(b - a, c - a)
 
 
+def closest_point(triangles: Array, points: Array) -> tuple[Array, Array]:
+    """The places (..., 3) of triangles (..., 3, 3) nearest to points (..., 3), and their weights (..., 3)."""
+    a, b, c = np.moveaxis(triangles, -2, 0)
+    ab, ac, ap = b - a, c - a, points - a
+
+    d1, d2 = row_dot(ab, ap), row_dot(ac, ap)
+    aa, bb, cc = row_dot(ab, ab), row_dot(ab, ac), row_dot(ac, ac)
+    area = np.maximum(aa * cc - bb * bb, LEAST_DIVISOR)
+    v, w = (cc * d1 - bb * d2) / area, (aa * d2 - bb * d1) / area
+    inside = (v >= 0.0) & (w >= 0.0) & (v + w <= 1.0)
+    # Else the nearest place is on one of the three sides.
+    on_ab = np.clip(d1 / np.maximum(aa, LEAST_DIVISOR), 0.0, 1.0)
+    on_ac = np.clip(d2 / np.maximum(cc, LEAST_DIVISOR), 0.0, 1.0)
+    on_bc = np.clip((d2 - d1 + aa - bb) / np.maximum(aa - 2.0 * bb + cc, LEAST_DIVISOR), 0.0, 1.0)
+    zero = np.zeros_like(v)
+    tried = np.stack(
+        [np.stack(each, axis=-1) for each in ((on_ab, zero), (zero, on_ac), (1.0 - on_bc, on_bc))], axis=-2
+    )
+    off = ap[..., None, :] - tried[..., :1] * ab[..., None, :] - tried[..., 1:] * ac[..., None, :]
+    best = np.argmin(row_dot(off, off), axis=-1)[..., None, None]
+    side = np.take_along_axis(tried, best, axis=-2)[..., 0, :]
+    v, w = np.where(inside, v, side[..., 0]), np.where(inside, w, side[..., 1])
+    return a + v[..., None] * ab + w[..., None] * ac, np.stack([1.0 - v - w, v, w], axis=-1)
+
+
 def middles_of_parts(n: int) -> Array:
     """The barycentric coordinates (n^2, 3) of the middles of n^2 equal parts of a triangle.
 

@@ -7,8 +7,10 @@ docs/messages.md of them.
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 OK, UNCERTAIN, NOT_CONVERGED = "ok", "uncertain", "not_converged"  # Each status.
@@ -276,3 +278,26 @@ def status_of(gravest: Doubt | None) -> str:
     if gravest is None:
         return OK
     return NOT_CONVERGED if gravest.code == "steps" else UNCERTAIN
+
+
+class Judged(ABC):
+    """A result that may be in doubt."""
+
+    @abstractmethod
+    def _doubting(self) -> Iterator[Doubt]:
+        """Reasons to doubt it, the gravest first."""
+
+    @cached_property
+    def doubts(self) -> tuple[Doubt, ...]:
+        """All reasons to doubt it, the gravest first."""
+        return tuple(self._doubting())
+
+    @cached_property
+    def gravest(self) -> Doubt | None:
+        """The gravest doubt, or None; the others are not looked for, which would take longer."""
+        return next(self._doubting(), None)
+
+    @property
+    def status(self) -> str:
+        """ "ok", "uncertain" or "not_converged"."""
+        return status_of(self.gravest)

@@ -16,7 +16,7 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
 from ..steps import chunked, result_of
 from ..triangles import LEAST_DIVISOR, triangle_cross
-from ..verdict import FINER, TOUCHES, Doubt, beyond, status_of
+from ..verdict import FINER, TOUCHES, Doubt, Judged, beyond
 from .borders import Border, snapped_to_border
 from .boundaries import Edge, edges_of, gaussian_curvature_of, node_dict
 from .charts import Charts
@@ -116,7 +116,7 @@ def _touch_at(point: Array, outward: Array, ahead: ArrayLike, extent: float, gai
 
 
 @dataclass(frozen=True, eq=False)
-class Atlas:
+class Atlas(Judged):
     """Overlapping patches: the nodes of a graph (paper, VI) whose edges are the curves where they meet.
 
     patches : the n nodes
@@ -179,25 +179,10 @@ class Atlas:
         return np.array(curvatures), np.array(stds)
 
     @property
-    def status(self) -> str:
-        """ "ok" or "uncertain"."""
-        return status_of(self.gravest)
-
-    @property
     def message(self) -> str:
         """The gravest doubt in a sentence with advice, or that there is none."""
         message = "The object was felt everywhere a finger could reach."
         return self.agreement or message if self.gravest is None else str(self.gravest)
-
-    @cached_property
-    def doubts(self) -> tuple[Doubt, ...]:
-        """All reasons to doubt it, the gravest first: of contacts, unfelt places, thin walls, the check."""
-        return tuple(self._doubting())
-
-    @cached_property
-    def gravest(self) -> Doubt | None:
-        """The gravest doubt, or None."""
-        return next(self._doubting(), None)
 
     def _doubting(self) -> Iterator[Doubt]:
         """Reasons to doubt it, the gravest first."""

@@ -33,7 +33,7 @@ from ..patch.domain import AT_POINT, Domain
 from ..patch.geometry import Geometry, similarity, total_absolute_curvature
 from ..patch.monge import MongePatch, exponents, monomials
 from ..patch.triangulation import patch_mesh
-from ..verdict import Doubt, beyond, status_of
+from ..verdict import Doubt, Judged, beyond
 from . import status
 from .status import Taps
 
@@ -43,7 +43,7 @@ MESH_SHARE = 0.6
 
 
 @dataclass(frozen=True, eq=False)
-class Reconstruction:
+class Reconstruction(Judged):
     """A patch around a reference point, its contacts and all results, in the caller's unit.
 
     geometry : the surface that was found: the posterior's mean for "bayes", `patch` for other methods
@@ -360,25 +360,10 @@ class Reconstruction:
         )
 
     @property
-    def status(self) -> str:
-        """ "ok", "uncertain" or "not_converged"."""
-        return status_of(self.gravest)
-
-    @property
     def message(self) -> str:
         """The gravest doubt in a sentence with advice, and what the contacts leave undetermined."""
         verdict = "The patch describes its contacts." if self.gravest is None else str(self.gravest)
         return f"{verdict}{self._notes}"
-
-    @cached_property
-    def doubts(self) -> tuple[Doubt, ...]:
-        """All reasons to doubt it, the gravest first."""
-        return tuple(self._doubting())
-
-    @cached_property
-    def gravest(self) -> Doubt | None:
-        """The gravest doubt, or None; the others are not looked for, which would take longer."""
-        return next(self._doubting(), None)
 
     def _doubting(self) -> Iterator[Doubt]:
         """Reasons to doubt it, the gravest first."""

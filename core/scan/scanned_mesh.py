@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array, finite_array
+from ..triangles import closest_point, normalized, triangle_cross
 
 LARGEST_MESH = 40.0
 LONGEST_EDGE = 0.25  # Longer edges are halved, so that a patch covers a hundred triangles.
@@ -49,10 +50,9 @@ def mesh_of(co: Array, corners: NDArray[np.intp], patch: float) -> ScanMesh:
             f"got {size:.2g}: bring both to one unit, or take another extent"
         )
     normals = np.zeros_like(co)
-    np.add.at(normals, corners, _area_vectors(co[corners])[:, None])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    pieces = _bisected(np.concatenate([co, normals], axis=1)[corners])
-    across, mean = _area_vectors(pieces[..., :3]), pieces.mean(axis=1)
+    np.add.at(normals, corners, triangle_cross(co[corners])[:, None])
+    pieces = _bisected(np.concatenate([co, normalized(normals)], axis=1)[corners])
+    across, mean = triangle_cross(pieces[..., :3]), pieces.mean(axis=1)
     lengths, bends = np.linalg.norm(across, axis=1), np.linalg.norm(mean[:, 3:], axis=1)
     good = (lengths > 1e-12) & (bends > 1e-6)
     if not good.any():
@@ -60,12 +60,6 @@ def mesh_of(co: Array, corners: NDArray[np.intp], patch: float) -> ScanMesh:
     centers, smooth = mean[good, :3], mean[good, 3:] / bends[good, None]
     tree = cKDTree(np.concatenate([centers, FACING_WEIGHT * smooth], axis=1))
     return ScanMesh(pieces[good, :, :3], across[good] / lengths[good, None], centers, smooth, tree)
-
-
-def _area_vectors(triangles: Array) -> Array:
-    """The normals (..., 3) of triangles (..., 3, 3), whose lengths are twice the areas."""
-    a, b, c = np.moveaxis(triangles, -2, 0)
-    return np.cross(b - a, c - a)
 
 
 def _bisected(pieces: Array) -> Array:
@@ -96,26 +90,12 @@ def mesh_distances(places: Array, oriented: Array, mesh: ScanMesh, neighbors: in
     up, offsets = mesh.normals[nearest], points - mesh.centers[nearest]
     if neighbors > 1:
         near %= len(mesh.centers)  # There may be fewer.
-        away = points[:, None] - _closest_points(points[:, None], mesh.triangles[near])
+        away = points[:, None] - closest_point(mesh.triangles[near], points[:, None])[0]
         # Triangles that face the other way belong to the other side of a thin wall, however near they are.
         back = np.einsum("nki,ni->nk", mesh.smooth[near], normals) < 0.0
         row, least = np.arange(len(points)), (np.linalg.norm(away, axis=2) + back).argmin(axis=1)
         offsets = away[row, least]
         # On the surface itself, only the normal gives a direction to it.
-        up = offsets + TOUCHING * mesh.normals[near[row, least]]
-        up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-300)
+        up = normalized(offsets + TOUCHING * mesh.normals[near[row, least]])
     distances, up = np.sum(offsets * up, axis=1).reshape(*arms.shape[:2], 1), up.reshape(arms.shape)
     return distances, np.concatenate([np.cross(arms, up), up], axis=2)
-
-
-def _closest_points(points: Array, triangles: Array) -> Array:
-    """The point (..., 3) of each triangle (..., 3, 3) that is nearest to a point (..., 3)."""
-    across, corners = _area_vectors(triangles), np.moveaxis(triangles, -2, 0)
-    edges, arms = np.roll(corners, -1, axis=0) - corners, points - corners
-    height = np.sum(arms[0] * across, axis=-1, keepdims=True)
-    below = points - height / np.sum(across**2, axis=-1, keepdims=True) * across
-    inside = (np.sum(np.cross(edges, arms) * across, axis=-1, keepdims=True) >= 0.0).all(axis=0)
-    shares = np.sum(arms * edges, axis=-1, keepdims=True) / np.sum(edges**2, axis=-1, keepdims=True)
-    feet = corners + np.clip(shares, 0.0, 1.0) * edges
-    nearest = np.sum((points - feet) ** 2, axis=-1, keepdims=True).argmin(axis=0)[None]
-    return np.where(inside, below, np.take_along_axis(feet, nearest, axis=0)[0])

@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from core.triangles import middles_of_parts
+from core.triangles import closest_point, middles_of_parts
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 7])
@@ -19,3 +19,17 @@ def test_equal_parts_of_a_triangle_have_its_integrals(n):
     assert np.mean(middles**2, axis=0) == pytest.approx([1 / 6 - 1 / (18 * n**2)] * 3)
     apart = np.linalg.norm(middles[:, None] - middles, axis=-1)
     assert n == 1 or apart[apart > 0.0].min() > 0.4 / n
+
+
+def test_the_closest_point_of_a_triangle_is_the_nearest_of_many():
+    rng = np.random.default_rng(0)
+    corners, points = rng.normal(size=(200, 3, 3)), rng.normal(size=(200, 3))
+    feet, weights = closest_point(corners, points)
+    a, b = np.meshgrid(np.linspace(0.0, 1.0, 101), np.linspace(0.0, 1.0, 101))
+    shares = np.stack([a, b, 1.0 - a - b])[:, a + b <= 1.0 + 1e-9].T
+    nearest = np.linalg.norm(shares @ corners - points[:, None], axis=2).min(axis=1)
+    ours = np.linalg.norm(feet - points, axis=1)
+    assert np.all(ours <= nearest + 1e-9)
+    assert ours == pytest.approx(nearest, abs=0.02)
+    assert weights.min() > -1e-9 and weights.sum(axis=1) == pytest.approx(np.ones(200))
+    assert np.einsum("nk,nki->ni", weights, corners) == pytest.approx(feet)

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from core import Contour, reconstruct, register
 from core.scan import pose_search, scanned_mesh
+from core.triangles import triangle_cross
 
 PLANES = surfaces.planes((0, 60, 120))
 TURN, SHIFT = Rotation.from_euler("xyz", (0.7, -1.1, 2.3)).as_matrix(), np.array([310.0, -40.0, 75.0])
@@ -325,9 +326,7 @@ def test_long_triangles_are_halved_until_a_patch_covers_many():
     mesh = scanned_mesh.mesh_of(corners, np.array([[0, 1, 2], [0, 2, 3]]), 1.0)
     edges = np.linalg.norm(np.roll(mesh.triangles, 1, axis=1) - mesh.triangles, axis=2)
     assert 0.125 < edges.max() <= 0.25
-    assert np.linalg.norm(scanned_mesh._area_vectors(mesh.triangles), axis=1).sum() / 2.0 == pytest.approx(
-        6.0
-    )
+    assert np.linalg.norm(triangle_cross(mesh.triangles), axis=1).sum() / 2.0 == pytest.approx(6.0)
     assert mesh.centers == pytest.approx(mesh.triangles.mean(axis=1))
     assert mesh.smooth == pytest.approx(np.tile([0.0, 0.0, 1.0], (len(mesh.smooth), 1)))
 
@@ -336,20 +335,6 @@ def test_a_piece_is_long_by_its_edges_and_not_by_its_normals():
     corners = 0.1 * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     normals = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     assert len(scanned_mesh._bisected(np.concatenate([corners, normals], axis=1)[None])) == 1
-
-
-def test_the_foot_on_a_triangle_is_the_nearest_of_its_points():
-    rng = np.random.default_rng(0)
-    triangles, points = rng.normal(size=(200, 3, 3)), rng.normal(size=(200, 3))
-    feet = scanned_mesh._closest_points(points, triangles)
-    a, b = np.meshgrid(np.linspace(0.0, 1.0, 101), np.linspace(0.0, 1.0, 101))
-    shares = np.stack([a, b, 1.0 - a - b])[:, a + b <= 1.0 + 1e-9].T
-    nearest = np.linalg.norm(shares @ triangles - points[:, None], axis=2).min(axis=1)
-    ours = np.linalg.norm(feet - points, axis=1)
-    assert np.all(ours <= nearest + 1e-9)
-    assert ours == pytest.approx(nearest, abs=0.02)
-    inside = np.linalg.solve(np.swapaxes(triangles, 1, 2), feet[..., None])[..., 0]
-    assert inside.min() > -1e-9 and inside.sum(axis=1) == pytest.approx(np.ones(200))
 
 
 def test_contours_are_tried_in_turns_of_ten_degrees(monkeypatch):
