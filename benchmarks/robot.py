@@ -125,7 +125,7 @@ def some(contacts, most):
 
 def averaged(contacts):
     """The means to which a reconstruction thins strokes."""
-    return means(contacts, np.array([1.0, 0.0]))[0]
+    return means(contacts, np.array([1.0, 0.0]), np.arange(len(contacts)))[0]
 
 
 KERNELS = {

@@ -79,31 +79,28 @@ def gathered(
         np.arange(len(contours) + len(arrays)), [*(len(c.points) for c in contours), *map(len, arrays)]
     )
     # Repeated contacts leave no gaps: without them the same contacts follow each other.
-    return points[first], np.argsort(np.argsort(first)) + stroke[first], noise
+    when = np.searchsorted(np.sort(first), first) + stroke[first]
+    return points[first], when, noise
 
 
-def means(
-    contacts: Array, along: Array, when: NDArray[np.intp] | None = None, strips: int = STRIPS
-) -> tuple[Array, int]:
-    """Contacts (n, 3) in unit radius, or strips^2 means of neighbors; the least number of contacts in a mean.
+def means(contacts: Array, along: Array, when: NDArray[np.intp]) -> tuple[Array, int]:
+    """Contacts (n, 3) in unit radius, or STRIPS^2 means of neighbors; the least number of contacts in a mean.
 
     Strips run across the direction `along` (2,). Each mean has an equal share of the area that was felt,
     because a sensor that dwells in a place adds nothing about the shape. Contacts with consecutive numbers in
-    `when` (n,) share the error of their row, so there are fewer strips if rows are far apart. Without `when`
-    they are in the order of time.
+    `when` (n,) share the error of their row, so there are fewer strips if rows are far apart.
     """
-    n = len(contacts)
-    if n <= strips**2:
+    if len(contacts) <= STRIPS**2:
         return contacts, 1
-    groups = _groups(contacts[:, :2], along, strips)
-    when = np.arange(n) if when is None else when
-    order = np.lexsort((when, groups))
-    starts = np.flatnonzero(np.diff(groups[order], prepend=-1))
-    rows = np.count_nonzero((np.diff(when[order]) != 1) | (np.diff(groups[order]) != 0)) + 1
-    if strips > LEAST_STRIPS and rows < ROWS * len(starts):
-        return means(contacts, along, when, strips - 2)
+    for strips in range(STRIPS, LEAST_STRIPS - 1, -2):
+        groups = _groups(contacts[:, :2], along, strips)
+        order = np.lexsort((when, groups))
+        starts = np.flatnonzero(np.diff(groups[order], prepend=-1))
+        rows = np.count_nonzero((np.diff(when[order]) != 1) | (np.diff(groups[order]) != 0)) + 1
+        if rows >= ROWS * len(starts):
+            break
     order = np.argsort(groups, kind="stable")  # Sums are the same whenever each contact was felt.
-    counts = np.diff(starts, append=n)[:, None]
+    counts = np.diff(starts, append=len(contacts))[:, None]
     # What they leave open of the quartic is as small as it can be in axes that they choose.
     over, turn = contacts[order], np.array([[along[0], -along[1]], [along[1], along[0]]])
     basis = monomials(over[:, :2] @ turn, QUARTIC)

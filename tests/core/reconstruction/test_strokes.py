@@ -236,18 +236,18 @@ def test_means_of_neighbors_lie_on_a_quartic_and_take_all_contacts():
 
     contacts = np.random.default_rng(0).uniform(-1.0, 1.0, (5000, 3))
     contacts[:, 2] = height(*contacts[:, :2].T)
-    found, size = means(contacts, ALONG)
+    found, size = means(contacts, ALONG, np.arange(len(contacts)))
     assert len(found) == STRIPS**2
     assert 0.6 * 5000 / STRIPS**2 < size <= 5000 / STRIPS**2
     assert found[:, 2] == pytest.approx(height(*found[:, :2].T), abs=1e-12)
     contacts[:, 2] = 1.0
     contacts[17, 2] += 500.0
-    assert means(contacts, ALONG)[0][:, 2].max() > 5.0
-    few, size = means(contacts[: STRIPS**2], ALONG)
+    assert means(contacts, ALONG, np.arange(len(contacts)))[0][:, 2].max() > 5.0
+    few, size = means(contacts[: STRIPS**2], ALONG, np.arange(STRIPS**2))
     assert size == 1
     assert np.array_equal(few, contacts[: STRIPS**2])
     # Contacts that are all in one place are no special case.
-    assert np.isfinite(means(np.zeros((5000, 3)), ALONG)[0]).all()
+    assert np.isfinite(means(np.zeros((5000, 3)), ALONG, np.arange(5000))[0]).all()
 
 
 def test_the_process_takes_what_a_sextic_leaves_of_strokes_too():
@@ -321,8 +321,8 @@ def test_a_mean_takes_in_several_rows():
     for rows, most in ((12, LEAST_STRIPS), (100, STRIPS)):
         x, y = np.meshgrid(np.linspace(-1.0, 1.0, 100), np.linspace(-1.0, 1.0, rows))
         points = np.column_stack([x.ravel(), y.ravel(), np.repeat(rng.normal(0.0, 1.0, rows), 100)])
-        assert len(means(points, np.array([0.0, 1.0]))[0]) == most**2
-    assert len(means(rng.permutation(points), ALONG)[0]) == STRIPS**2
+        assert len(means(points, np.array([0.0, 1.0]), np.arange(len(points)))[0]) == most**2
+    assert len(means(rng.permutation(points), ALONG, np.arange(len(points)))[0]) == STRIPS**2
 
 
 @pytest.mark.parametrize("name", SURFACES)
@@ -430,6 +430,6 @@ def test_means_of_contacts_on_two_lines_stay_on_the_plane():
     lines = [np.column_stack([x, sign * x + rng.normal(0.0, 1e-6, 450), 0.0 * x]) for sign in (1.0, -1.0)]
     contacts = np.vstack(lines)
     contacts[:, 2] = rng.normal(0.0, 1e-3, 900)
-    found, size = means(contacts, ALONG)
+    found, size = means(contacts, ALONG, np.arange(len(contacts)))
     assert size > 1
     assert np.abs(found[:, 2]).max() < 5e-3
