@@ -11,7 +11,7 @@ import numpy as np
 from ... import core
 from ...core.arguments import many
 from .settings import METHODS
-from .touch_report import Registration, SuggestedPlane, TouchReport
+from .touch_report import TouchReport
 from .units import Unit, known, length, rounded, say, unit_of_report
 
 SPREAD = ("mean", "median", "max", "rms")
@@ -173,7 +173,7 @@ def _verified_rows(report: TouchReport, unit: Unit) -> list[tuple[str, str]]:
     ]
 
 
-def registration_summary(found: Registration, unit: Unit | None = None) -> str:
+def registration_summary(found: Mapping[str, Any], unit: Unit | None = None) -> str:
     """A sentence on where a patch was put by registration, in this unit or in that of the residual."""
     residual = found["residuals"][found["pose"] - 1]
     words = f'The contacts are {length(residual, unit)} off "{found["target"]}" (root mean square)'
@@ -188,7 +188,7 @@ def _spread(report: TouchReport, what: str, unit: Unit) -> str:
     return ", ".join(f"{key} {_length(found[f'{what}_{key}'], report, unit)}" for key in SPREAD)
 
 
-def _suggestion(plane: SuggestedPlane, unit: Unit) -> str:
+def _suggestion(plane: Mapping[str, Any], unit: Unit) -> str:
     return (
         f"azimuth {plane['azimuth']:.0f} degrees, along {vector(plane['tangent'])}; "
         f"would take the standard deviation of the height to {say(plane['expected_height_std'], 1, unit)}"
