@@ -122,3 +122,11 @@ def test_the_tab_is_where_the_preferences_have_it(extension, empty):
     preferences.tab = ""
     assert tabs() == {"Tactile"}
     preferences.tab = "Tactile"
+
+
+def test_each_operator_that_a_panel_or_a_menu_names_is_registered(extension, empty):
+    folder = Path(extension.tactile_addon.__file__).parent
+    sources = [path.read_text(encoding="utf-8") for path in folder.rglob("*.py")]
+    names = {name for source in sources for name in re.findall(r'"tactile\.(\w+)"', source)}
+    assert {"pick", "delete", "touch_all_over"} <= names
+    assert names <= {*dir(empty.ops.tactile), "tool"}  # The last is a tool.
