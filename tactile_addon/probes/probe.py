@@ -213,11 +213,6 @@ def make(context: bpy.types.Context, target: Object) -> Object:
     return probe
 
 
-def _show(obj: Object) -> None:
-    """Colors a patch by the quantity it is set to show now, without the range of the one before."""
-    shown.set_range(obj, 0.0)
-
-
 # Properties of objects, by name.
 PROPERTIES = {
     "tactile_probe": PointerProperty(type=TactileProbe, override=OVERRIDABLE),
@@ -226,7 +221,7 @@ PROPERTIES = {
         description="What the colors of the patch show",
         items=[item[:3] for item in patch_record.QUANTITIES],
         override=OVERRIDABLE,
-        update=lambda obj, _: _show(obj),
+        update=lambda obj, _: shown.set_range(obj, 0.0),  # That of the quantity before says nothing of this.
     ),
     "tactile_contours": BoolProperty(
         name="Contours",
@@ -245,12 +240,3 @@ PROPERTIES = {
         override=OVERRIDABLE,
     ),
 }
-
-
-def register() -> None:
-    """Registers the settings of probes, which PROPERTIES need."""
-    bpy.utils.register_class(TactileProbe)
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(TactileProbe)
