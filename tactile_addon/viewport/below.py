@@ -2,11 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which mesh is below the mouse, and where."""
 
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Iterator
 
 import bpy
-from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Matrix, Vector
 
 from ..probes import probe
@@ -26,36 +24,6 @@ def large_meshes(context: bpy.types.Context) -> set[str]:
         obj for obj in context.view_layer.objects if obj.type == "MESH" and obj.visible_get()
     )
     return {obj.name for obj in meshes if len(obj.evaluated_get(depsgraph).data.polygons) > MANY_FACES}
-
-
-def names_below(context: bpy.types.Context, event: bpy.types.Event, names: Iterable[str]) -> list[str]:
-    """Those of the names whose objects may be below the mouse, judged by their boxes."""
-    viewport = viewport_below(context, event)
-    if viewport is None:
-        return []
-    _, region, view = viewport
-    mouse = event.mouse_x - region.x, event.mouse_y - region.y
-    return [name for name in names if name in bpy.data.objects and _is_over(name, region, view, mouse)]
-
-
-def _is_over(
-    name: str, region: bpy.types.Region, view: bpy.types.RegionView3D, mouse: Sequence[float]
-) -> bool:
-    obj = bpy.data.objects[name]
-    corners = (obj.matrix_world @ Vector(corner) for corner in obj.bound_box)
-    seen = [location_3d_to_region_2d(region, view, corner) for corner in corners]
-    if None in seen:  # A corner is behind the eye.
-        return True
-    ranges = ((min(axis), max(axis)) for axis in zip(*seen, strict=True))
-    return all(low <= at <= high for at, (low, high) in zip(mouse, ranges, strict=True))
-
-
-def read(context: bpy.types.Context, names: Iterable[str]) -> None:
-    """Has Blender build the trees of these objects' faces, which it keeps."""
-    depsgraph = context.evaluated_depsgraph_get()
-    for name in names:
-        with suppress(ValueError):  # The touch will say why.
-            MeshSurface(bpy.data.objects[name], depsgraph)
 
 
 def point_below(

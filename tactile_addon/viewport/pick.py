@@ -15,6 +15,7 @@ from ..probes.operators import (
     report_done,
     report_error,
     target_object,
+    waiting,
 )
 from ..scene import patch_record
 from ..scene.viewports import show_colors, show_size
@@ -33,7 +34,7 @@ from ..touch.touch_object import Touched, touch
 from ..touch.types import Object, Outcome
 from ..touch.wording import curvatures, sentence, verdict
 from . import overlay
-from .below import large_meshes, names_below, point_below, read
+from .below import large_meshes, point_below
 from .mouse import draw_hints
 
 NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NDOF", "NUMPAD", "MOUSEROTATE", "MOUSESMARTZOOM", "HOME")
@@ -78,7 +79,7 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         active = context.view_layer.objects.active
         if active is not None and active.type == "MESH":
             show_size(max(active.dimensions[:]))
-        self._area, self._unread = context.area, large_meshes(context)
+        self._area, self._large = context.area, large_meshes(context)
         for name in NAMES:  # Blender remembers those of the last pick, which suited another object.
             self.properties.property_unset(name)
         try:
@@ -115,9 +116,9 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
     def _click(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         """Touches below the mouse at once, as the tool in the toolbar does."""
         self._seen = {"touched": None}
-        words = self._hover(context, event)
+        with waiting(context):
+            words = self._hover(context, event)
         self._area.header_text_set(None)
-        context.window.cursor_modal_restore()
         if self._seen["touched"] is None:
             self.report({"WARNING"}, words)
             return {"CANCELLED"}
@@ -207,9 +208,10 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         The header has no room for a sentence, so a refusal is drawn next to the mouse.
         """
         words = short = "Move over a mesh to touch it"
+        if self._large:  # Blender builds trees of their faces then.
+            short += f" (the first touch of {', '.join(sorted(self._large))} takes a while)"
         self._seen |= {"touched": None, "refusal": None, "mouse": (event.mouse_x, event.mouse_y)}
         try:
-            self._read(context, names_below(context, event, self._unread))
             found = point_below(context, event)
             if found is not None:
                 obj, location, eye = found
@@ -229,17 +231,6 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         self._area.header_text_set(f"Pick Reference Point     {short}")
         _redraw(context)
         return words
-
-    def _read(self, context: bpy.types.Context, names: list[str]) -> None:
-        """Prepares large meshes for their first touch, and says so, because it takes a while."""
-        if not names:
-            return
-        self._unread.difference_update(names)
-        self._area.header_text_set(f"Pick Reference Point     Reading {', '.join(names)} for the first touch")
-        context.window.cursor_modal_set("WAIT")
-        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
-        read(context, names)
-        context.window.cursor_modal_set("EYEDROPPER")
 
 
 def _redraw(context: bpy.types.Context) -> None:
