@@ -18,7 +18,7 @@ from bpy.app.handlers import persistent
 from ..scene import undo
 from ..scene.family import remembered
 from ..scene.viewports import has_gesture
-from ..touch.settings import is_silent, something_happened
+from ..touch.settings import is_silent
 from ..touch.types import Object
 from . import anchor, deleted
 from .probe import forget_targets, is_probe, lock_of, probe_of, record_of, targets
@@ -47,7 +47,6 @@ def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> N
 def _bring_up_to_date(depsgraph: bpy.types.Depsgraph, dearest: float) -> None:
     """Touches again if the last touch took at most `dearest` seconds; other patches say "outdated"."""
     global _unsure
-    something_happened()
     if is_silent() or not (targets() or _unsure):
         return
     if depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
