@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, size_of
+from .evaluated_mesh import PlacedMesh, coordinates, evaluated_object, size_of
 from .oriented import require_oriented
 from .types import Array, Object, Point, Triple
 
@@ -29,14 +29,10 @@ class MeshSurface(PlacedMesh):
 
     def __init__(self, obj: Object, depsgraph: bpy.types.Depsgraph, sound: bool = False) -> None:
         """Raises ValueError, with a sentence, if `obj` cannot be touched."""
-        try:
-            evaluated, linear, origin = evaluated_object(obj, depsgraph)
-            if not sound:
-                self._co = coordinates(evaluated)
-                require_oriented(evaluated, self._co)
-            evaluated.ray_cast((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), distance=1e-30, depsgraph=depsgraph)
-        except RuntimeError as error:
-            raise disabled(obj) from error
+        evaluated, linear, origin = evaluated_object(obj, depsgraph)
+        if not sound:
+            self._co = coordinates(evaluated)
+            require_oriented(evaluated, self._co)
         rays = evaluated.ray_cast
 
         def cast(start: Point, direction: Point, distance: float) -> Any:
