@@ -27,6 +27,8 @@ may differ afterward.
                      and touches then if there was no time before
 """
 
+from functools import cache
+
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -94,34 +96,25 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
     lost: StringProperty(description="Data of a target that was deleted", options={"HIDDEN"})
 
 
-# The session_uids of the probes' targets, 0 for none; None if they are to be looked up.
-_targets: set[int] | None = None
-
-
+@cache
 def targets() -> set[int]:
-    """The session_uids of the targets of all probes in this file; 0 for a probe without target."""
-    global _targets
-    if _targets is None:
-        of = (obj.tactile_probe.target for obj in all_objects() if is_probe(obj))
-        _targets = {0 if target is None else target.session_uid for target in of}
-    return _targets
+    """The session_uids of the targets of all probes in this file; 0 for a probe without target.
 
-
-def forget_targets() -> None:
-    """Makes `targets` look again, because probes may have come or gone or changed their targets."""
-    global _targets
-    _targets = None
+    Its cache is cleared when probes may have come or gone or changed their targets.
+    """
+    of = (obj.tactile_probe.target for obj in all_objects() if is_probe(obj))
+    return {0 if target is None else target.session_uid for target in of}
 
 
 def _appointed(settings: TactileProbe, context: bpy.types.Context) -> None:
-    forget_targets()
+    targets.cache_clear()
     changed(settings, context)
 
 
 def _chosen(settings: TactileProbe, context: bpy.types.Context) -> None:
     """Makes a probe that was a child of its target a child of the new target."""
     if is_silent():  # It is the same target, which has come back or is an override now.
-        forget_targets()
+        targets.cache_clear()
         return
     settings.lost, probe, record = "", settings.id_data, record_of(settings.id_data)
     before = None if record is None else bpy.data.objects.get(record["source"])
