@@ -46,13 +46,7 @@ def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> N
 
 def _bring_up_to_date(depsgraph: bpy.types.Depsgraph, dearest: float) -> None:
     """Touches again if the last touch took at most `dearest` seconds; other patches say "outdated"."""
-    global _unsure
-    if is_silent() or not (targets() or _unsure):
-        return
-    if depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
-        return
-    if not targets():
-        _unsure = False
+    if is_silent() or not targets() or depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
         return
     with remembered(), undo.after_step():
         concerned, unsure = _concerned(depsgraph)

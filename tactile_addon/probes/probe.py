@@ -177,24 +177,20 @@ def record_of(obj: Object) -> TouchReport | None:
     return None if patch is None else patch_record.report_of(patch)
 
 
-def require_unlocked(obj: Object) -> None:
-    """Raises ValueError if anything of the probe or patch near `obj` cannot be changed."""
-    for each in filter(None, (probe_of(obj), patch_near(obj))):
-        if not each.is_editable:
-            raise ValueError(
-                f'"{each.name}" comes from a library: make it local, or override it, to change it'
-            )
-        if each.type == "MESH" and each.data.is_editmode:
-            raise ValueError(f'"{each.name}" is being edited: leave its Edit Mode first')
-
-
 def lock_of(obj: Object) -> str | None:
     """A sentence on why the probe or patch near `obj` cannot be changed, or None if it can."""
-    try:
-        require_unlocked(obj)
-    except ValueError as error:
-        return str(error)
+    for each in filter(None, (probe_of(obj), patch_near(obj))):
+        if not each.is_editable:
+            return f'"{each.name}" comes from a library: make it local, or override it, to change it'
+        if each.type == "MESH" and each.data.is_editmode:
+            return f'"{each.name}" is being edited: leave its Edit Mode first'
     return None
+
+
+def require_unlocked(obj: Object) -> None:
+    """Raises ValueError if the probe or patch near `obj` cannot be changed."""
+    if lock := lock_of(obj):
+        raise ValueError(lock)
 
 
 def make(context: bpy.types.Context, target: Object) -> Object:

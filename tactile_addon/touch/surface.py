@@ -30,9 +30,6 @@ class MeshSurface(PlacedMesh):
     def __init__(self, obj: Object, depsgraph: bpy.types.Depsgraph, sound: bool = False) -> None:
         """Raises ValueError, with a sentence, if `obj` cannot be touched."""
         evaluated, linear, origin = evaluated_object(obj, depsgraph)
-        if not sound:
-            self._co = coordinates(evaluated)
-            require_oriented(evaluated, self._co)
         rays = evaluated.ray_cast
 
         def cast(start: Point, direction: Point, distance: float) -> Any:
@@ -42,6 +39,8 @@ class MeshSurface(PlacedMesh):
         super().__init__(linear, origin, cast)
         self._mesh, self._object, self._depsgraph = evaluated.data, evaluated, depsgraph
         self.name, self.size = obj.name, size_of(evaluated, linear)
+        if not sound:
+            require_oriented(evaluated, self._co)
 
     @cached_property
     def _co(self) -> Array:
