@@ -13,9 +13,9 @@ from .files import contact_operators, export_operators
 from .probes import change_handlers, in_slices, operators, probe, probe_operators
 from .report import report_operator
 from .scene import shown
-from .sidebar import dots, panel, preferences, rows
+from .sidebar import panel, preferences, rows
 from .stability_map import map_object, map_operator
-from .viewport import drag, gizmos, overlay, pick, tool
+from .viewport import drag, gizmos, overlay, pick
 from .whole_object import kept, object_operator, surface_operators
 
 CLASSES = (
@@ -53,11 +53,10 @@ HERE = str(Path(__file__).resolve().parent)  # It holds presets/.
 
 
 def register() -> None:
-    dots.register()
     _register_classes()
     for name, kind in PROPERTIES.items():
         setattr(bpy.types.Object, name, kind)
-    tool.register()
+    pick.register_tool()
     preferences.restore_tab()
     for menu, draw in MENUS:
         getattr(bpy.types, menu).append(draw)
@@ -77,9 +76,8 @@ def unregister() -> None:
     bpy.utils.unregister_manual_map(preferences.manual_map)
     for menu, draw in MENUS:
         getattr(bpy.types, menu).remove(draw)
-    tool.unregister()
+    pick.unregister_tool()
     kept.forget()
     for name in PROPERTIES:
         delattr(bpy.types.Object, name)
     _unregister_classes()
-    dots.unregister()

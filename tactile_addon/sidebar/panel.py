@@ -24,9 +24,8 @@ from ..touch.types import Object, PanelMixin
 from ..touch.units import Unit
 from ..touch.wording import curvatures, reasons, registration_summary, verdict
 from ..whole_object.object_report import deviation, facets, is_all_within, object_rows, object_verdict
-from .dots import dot
 from .patch_rows import found_values, main_rows, other_rows, plane_rows
-from .rows import draw_rows, draw_sentence
+from .rows import dot, draw_rows, draw_sentence
 
 TAB = "Tactile"
 FACETED = {"facets", "folds"}  # A Subdivision modifier may take these doubts away.
@@ -249,8 +248,10 @@ def _draw_more(
 def _draw_colors(context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object, name: str) -> None:
     """Draws what the colors show, and a button if the viewport does not show them."""
     layout.prop(obj, name)
-    if not shows_colors(context.space_data):
-        layout.operator("tactile.show_colors", icon="SHADING_SOLID")
+    space: Any = context.space_data
+    if not shows_colors(space):
+        shown = ("type", "SOLID") if space.shading.type == "WIREFRAME" else ("color_type", "VERTEX")
+        layout.prop_enum(space.shading, *shown, text="Show Patch Colors", icon="SHADING_SOLID")
 
 
 def _draw_range(context: bpy.types.Context, layout: bpy.types.UILayout, patch: Object) -> None:
@@ -287,13 +288,8 @@ def _draw_comparison(
     layout = layout.column()
     layout.active = record["status"] != "outdated"
     layout.label(text=record["verification"]["target"], icon="MESH_DATA", translate=False)
-    column = layout.column(align=True)
-    for label, *values in verification_table(record, unit):
-        row = column.row(align=True).split(factor=0.31, align=True)
-        row.label(text=label)
-        row = row.row(align=True)
-        for value in values:
-            row.label(text=value)
+    table = [(label, " | ".join(values)) for label, *values in verification_table(record, unit)]
+    draw_rows(context, layout, table)
     draw_rows(context, layout, verification_rows(record, unit))
 
 

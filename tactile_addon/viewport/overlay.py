@@ -8,9 +8,7 @@ from typing import Any
 
 import blf
 import bpy
-import gpu
 import numpy as np
-from gpu_extras.batch import batch_for_shader
 
 from ..probes import probe
 from ..scene import colors, patch_record
@@ -22,7 +20,7 @@ from ..touch.touch_object import plane_axes
 from ..touch.types import Object
 from ..touch.units import Unit
 from .above import draw_above
-from .curves import FONT, PLANE_COLORS, WHITE, draw_curves, draw_letters, draw_preview
+from .curves import FONT, PLANE_COLORS, WHITE, draw_curves, draw_letters, draw_preview, draw_shape
 from .drag import DRAG_TILT, DRAG_TURN
 from .free_view import free_strip
 from .mouse import is_over
@@ -95,13 +93,9 @@ def draw_plane() -> None:
     number = min(settings.active_plane, settings.plane_count - 1)
     t, up, _ = plane_axes(obj.matrix_world, settings, number).T
     origin, size = np.array(obj.matrix_world.translation, dtype=float), record["extent"]
-    corners = [origin + size * (a * t + b * up) for a, b in ((-1, -0.6), (1, -0.6), (1, 0.6), (-1, 0.6))]
-    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    gpu.state.blend_set("ALPHA")
-    shader.uniform_float("color", (*PLANE_COLORS[number], 0.18))
-    positions: dict[str, Any] = {"pos": [corner.tolist() for corner in corners]}
-    batch_for_shader(shader, "TRIS", positions, indices=[(0, 1, 2), (0, 2, 3)]).draw(shader)
-    gpu.state.blend_set("NONE")
+    corners = [origin + size * (a * t + b * up) for a, b in ((-1, -0.6), (1, -0.6), (-1, 0.6), (1, 0.6))]
+    strip = {"pos": np.array(corners).tolist()}
+    draw_shape("TRI_STRIP", "UNIFORM_COLOR", strip, color=(*PLANE_COLORS[number], 0.18))
 
 
 def draw_legend() -> None:
@@ -194,7 +188,8 @@ def _draw_bar(
     """Draws the colors from `low` to 1, and the (share, text) labels below them."""
     at = np.linspace(x, x + wide, LEGEND_STEPS)
     shades = colors.shades(np.repeat(np.linspace(low, 1.0, LEGEND_STEPS), 2), 1.0)
-    _fill([(a, b) for a in at for b in (y, y + high)], shades.tolist())
+    points = [(a, b) for a in at for b in (y, y + high)]
+    draw_shape("TRI_STRIP", "SMOOTH_COLOR", {"pos": points, "color": shades.tolist()})
     labels = [(share, text.replace("-", "\N{MINUS SIGN}")) for share, text in labels]
     first, middle, last = (blf.dimensions(FONT, text)[0] for _, text in labels)
     if 0.5 * (wide - middle) < max(first, last):
@@ -207,20 +202,13 @@ def _draw_bar(
 
 
 def _fill_box(x: float, y: float, wide: float, high: float, color: Sequence[float]) -> None:
-    _fill([(x, y), (x + wide, y), (x, y + high), (x + wide, y + high)], [color] * 4)
+    corners = {"pos": [(x, y), (x + wide, y), (x, y + high), (x + wide, y + high)]}
+    draw_shape("TRI_STRIP", "UNIFORM_COLOR", corners, color=color)
 
 
 def _write(text: str, x: float, y: float) -> None:
     blf.position(FONT, x, y, 0.0)
     blf.draw(FONT, text)
-
-
-def _fill(points: Sequence[Sequence[float]], shades: Sequence[Sequence[float]]) -> None:
-    """Draws a strip of triangles, each point (x, y) of which has a color of its own."""
-    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
-    gpu.state.blend_set("ALPHA")
-    batch_for_shader(shader, "TRI_STRIP", {"pos": points, "color": shades}).draw(shader)
-    gpu.state.blend_set("NONE")
 
 
 # Functions that draw and when they do so: those that are always there, and those of a pick. The latter get a

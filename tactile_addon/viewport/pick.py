@@ -34,8 +34,7 @@ from ..touch.touch_object import Touched, touch
 from ..touch.types import Object, Outcome
 from ..touch.wording import curvatures, sentence, verdict
 from . import overlay
-from .below import large_meshes, point_below
-from .mouse import draw_hints
+from .mouse import draw_hints, large_meshes, point_below
 
 NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NDOF", "NUMPAD", "MOUSEROTATE", "MOUSESMARTZOOM", "HOME")
 HINTS = (
@@ -237,3 +236,32 @@ def _redraw(context: bpy.types.Context) -> None:
     for area in context.screen.areas:
         if area.type == "VIEW_3D":
             area.tag_redraw()
+
+
+class TactileTool(bpy.types.WorkSpaceTool):
+    bl_space_type, bl_context_mode = "VIEW_3D", "OBJECT"
+    bl_idname = "tactile.tool"
+    bl_label = "Tactile Probe"
+    bl_description = "Click on a mesh to place a probe there or to move the active probe there"
+    bl_icon = "ops.paint.eyedropper_add"
+    bl_keymap = (
+        (
+            TACTILE_OT_pick.bl_idname,
+            {"type": "LEFTMOUSE", "value": "PRESS"},
+            {"properties": [("at_once", True)]},
+        ),
+    )
+
+
+def register_tool() -> None:
+    """Adds the tool to the toolbar."""
+    bpy.utils.register_tool(TactileTool, after={"builtin.measure"})
+
+
+def unregister_tool() -> None:
+    """Takes the tool out of the toolbar."""
+    bpy.utils.unregister_tool(TactileTool)
+    # Blender itself leaves the tool's keys among the user's keys.
+    user = bpy.context.window_manager.keyconfigs.user
+    for keymap in [keymap for keymap in user.keymaps if keymap.name.endswith(f", {TactileTool.bl_label}")]:
+        user.keymaps.remove(keymap)

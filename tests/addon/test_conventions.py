@@ -60,7 +60,6 @@ def test_what_cannot_run_says_why(empty):
     assert refused("pick") == said
     on_probes = ("add_plane", "add_planes", "remove_plane", "update", "delete")
     assert {refused(name) for name in on_probes} == {"Select a probe, or pick a reference point first"}
-    assert refused("show_colors") == "Use it in a 3D viewport"
     for name in ("verify", "register", "export_contacts", "export_patch"):
         assert refused(name).startswith("Select a ")
     empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32)
