@@ -19,7 +19,9 @@ from ..viewport.overlay import TEXT
 
 # About the width of a letter, and what is free around a text, in pixels at scale 1.
 LETTER, PADDING = 6.5, 12.0
-CENTER, RADIUS, CORNERS = 128, 80, 24  # of a dot in an icon, which is 255 wide and high
+# A dot in an icon that is 255 wide and high. Blender draws icons of triangles twice as large as others, to
+# the right, as its toolbar needs them: so the dot is in the middle of the left.
+CENTER, RADIUS, CORNERS = (64, 128), 40, 24
 
 TIPS = {
     "κ1": "The smaller principal curvature at the point; below 0 the surface bulges outward",
