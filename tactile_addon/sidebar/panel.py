@@ -24,8 +24,9 @@ from ..touch.types import Object, PanelMixin
 from ..touch.units import Unit
 from ..touch.wording import curvatures, reasons, registration_summary, verdict
 from ..whole_object.object_report import deviation, facets, is_all_within, object_rows, object_verdict
+from .dots import dot
 from .patch_rows import found_values, main_rows, other_rows, plane_rows
-from .rows import dot, draw_rows, draw_sentence
+from .rows import draw_rows, draw_sentence
 
 TAB = "Tactile"
 FACETED = {"facets", "folds"}  # A Subdivision modifier may take these doubts away.

@@ -1,27 +1,22 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the sidebar draws sentences, rows of numbers that have tooltips, and the colors of planes."""
+"""How the sidebar draws sentences, and rows of numbers that have tooltips."""
 
 import re
 import textwrap
 from collections.abc import Sequence
-from functools import cache
 from typing import Any
 
 import blf
 import bpy
-import numpy as np
 from bpy.props import StringProperty
 
 from ..touch.types import Outcome
-from ..viewport.curves import FONT, PLANE_COLORS
+from ..viewport.curves import FONT
 from ..viewport.overlay import TEXT
 
 # About the width of a letter, and what is free around a text, in pixels at scale 1.
 LETTER, PADDING = 6.5, 12.0
-# A dot in an icon that is 255 wide and high. Blender draws icons of triangles twice as large as others, to
-# the right, as its toolbar needs them: so the dot is in the middle of the left.
-CENTER, RADIUS, CORNERS = (64, 128), 40, 24
 
 TIPS = {
     "κ1": "The smaller principal curvature at the point; below 0 the surface bulges outward",
@@ -136,15 +131,3 @@ def draw_sentence(
 def _letters(context: bpy.types.Context) -> float:
     """About how many letters fit into a line of the sidebar."""
     return context.region.width / (LETTER * context.preferences.system.ui_scale) - 8.0
-
-
-@cache
-def dot(plane: int) -> int:
-    """The number of an icon: a dot in the color of the handle and curve of the plane with this index."""
-    turns = np.linspace(0.0, 2.0 * np.pi, CORNERS + 1)
-    rim = CENTER + RADIUS * np.column_stack([np.cos(turns), np.sin(turns)])
-    triangles = np.stack([np.full((CORNERS, 2), CENTER), rim[:-1], rim[1:]], axis=1)
-    colors = np.tile([*PLANE_COLORS[plane], 1.0], (3 * CORNERS, 1))
-    return bpy.app.icons.new_triangles(
-        (255, 255), triangles.astype(np.uint8).tobytes(), (255.0 * colors).astype(np.uint8).tobytes()
-    )
