@@ -15,7 +15,6 @@ from ..probes.operators import (
     report_done,
     report_error,
     target_object,
-    waiting,
 )
 from ..scene import patch_record
 from ..scene.viewports import show_colors, show_size
@@ -85,13 +84,13 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
             self._inherit(context)
         except ValueError as error:
             return report_error(self, error)
-        if self.at_once:
-            return self._click(context, event)
         # The drawing may outlive this operator by a redraw, so it gets a dict and not the operator.
         self._seen: dict[str, Any] = {}
         self._drawings = overlay.add_drawings(overlay.PICK_DRAWINGS, self._seen)
         context.window.cursor_modal_set("EYEDROPPER")
         context.workspace.status_text_set(lambda header, _: draw_hints(header.layout, HINTS))
+        if self.at_once:
+            return self._press(context, event)
         context.window_manager.modal_handler_add(self)
         self._hover(context, event)
         return {"RUNNING_MODAL"}
@@ -105,26 +104,20 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         if event.type == "MOUSEMOVE":
             self._hover(context, event)
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
-            words = self._hover(context, event)
-            if self._seen["touched"] is not None:
-                self.cancel(context)
-                return self._take(context)
-            self._seen["refusal"] = words
+            return self._press(context, event)
         return {"RUNNING_MODAL"}
 
-    def _click(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
-        """Touches below the mouse at once, as the tool in the toolbar does."""
-        self._seen = {"touched": None}
-        with waiting(context):
-            words = self._hover(context, event)
-        self._area.header_text_set(None)
-        if self._seen["touched"] is None:
+    def _press(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
+        """Makes the probe below the mouse; where no touch is possible, a pick goes on and the tool ends."""
+        words = self._hover(context, event)
+        touched = self._seen["touched"]
+        if touched is None and not self.at_once:
+            self._seen["refusal"] = words
+            return {"RUNNING_MODAL"}
+        self.cancel(context)
+        if touched is None:
             self.report({"WARNING"}, words)
             return {"CANCELLED"}
-        return self._take(context)
-
-    def _take(self, context: bpy.types.Context) -> Outcome:
-        touched = self._seen["touched"]
         self.target, self.location = touched.report["source"], touched.result.point
         self.outward = touched.result.frame.axes[:, 2]
         return self._make(context, touched)
