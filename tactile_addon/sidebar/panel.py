@@ -252,7 +252,9 @@ def _draw_colors(context: bpy.types.Context, layout: bpy.types.UILayout, obj: Ob
     space: Any = context.space_data
     if not shows_colors(space):
         shown = ("type", "SOLID") if space.shading.type == "WIREFRAME" else ("color_type", "VERTEX")
-        layout.prop_enum(space.shading, *shown, text="Show Patch Colors", icon="SHADING_SOLID")
+        row = layout.row()
+        row.use_property_split = False
+        row.prop_enum(space.shading, *shown, text="Show Patch Colors", icon="SHADING_SOLID")
 
 
 def _draw_range(context: bpy.types.Context, layout: bpy.types.UILayout, patch: Object) -> None:
