@@ -22,20 +22,16 @@ SEAT = 20  # The count of numbers for the place in the target, directions there,
 CLOSE = 1e-5  # A smaller change of a number, or of a length as a share of the extent, is rounding of float32.
 
 
-def attach(probe: Object, target: Object) -> None:
-    """Makes the probe a child of its target without moving it, unless the target depends on the probe."""
+def attach(probe: Object, target: Object | None) -> None:
+    """Makes the probe a child of its target, or of nothing, without moving it.
+
+    A target that depends on the probe is left alone.
+    """
     if target == probe or target in probe.children_recursive:
         return
     place = probe.matrix_world.copy()
     probe.parent, probe.parent_type = target, "OBJECT"
     patch_record.place(probe, place)
-
-
-def detach(probe: Object) -> None:
-    """Takes the probe's parent away without moving the probe."""
-    place = probe.matrix_world.copy()
-    probe.parent = None
-    probe.matrix_world = probe.matrix_basis = place
 
 
 def is_attached(probe: Object) -> bool:
@@ -44,9 +40,9 @@ def is_attached(probe: Object) -> bool:
     return target is not None and probe.parent == target and probe.parent_type == "OBJECT"
 
 
-def can_have_children(probe: Object) -> bool:
+def can_have_children(obj: Object) -> bool:
     """Whether children of an object can be placed: not if its scale is 0 or not finite."""
-    return all(0.0 < abs(scale) < math.inf for scale in probe.matrix_world.to_scale())
+    return all(0.0 < abs(scale) < math.inf for scale in obj.matrix_world.to_scale())
 
 
 def placed(place: Array, axes: Array, scale: Any = None) -> Matrix:

@@ -33,7 +33,7 @@ def forget_target(probe: Object) -> None:
         return
     settings.lost = f"{target.session_uid} {int(anchor.is_attached(probe))} {target.name}"
     if anchor.is_attached(probe):  # The object is in no scene any more.
-        anchor.detach(probe)
+        anchor.attach(probe, None)
     settings.property_unset("target")
     if not target.users:
         _deleted.add(target.session_uid)
