@@ -11,7 +11,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..scene import patch_object, patch_record
-from ..touch.evaluated_mesh import checksum_of, is_disabled, require_in_scene
+from ..touch.evaluated_mesh import checksum_of, is_disabled, require_in_scene, require_invertible
 from ..touch.settings import touch_arguments
 from ..touch.touch_object import Touched, completed, touch
 from ..touch.types import Object
@@ -111,8 +111,9 @@ def touch_at(probe: Object, depsgraph: bpy.types.Depsgraph, complete: bool, **mo
         raise ValueError(
             f'"{settings.target.name}" is not in this view layer: bring it back, or choose another target'
         )
-    # If the target is scaled to 0, so is a probe that is its child, and the touch says why there is none.
-    if not anchor.can_have_children(probe) and anchor.can_have_children(settings.target):
+    if anchor.is_attached(probe):  # If the target is scaled to 0, so is the probe.
+        require_invertible(settings.target.name, np.array(settings.target.matrix_world, dtype=float))
+    if not anchor.can_have_children(probe):
         raise ValueError("the probe has a scale of 0 or beyond all numbers: give it a scale of 1")
     arguments = touch_arguments(settings)
     if not complete and record_of(probe) is not None:
