@@ -147,7 +147,7 @@ def scan_places(extension):
 
 def _within_reach(surface, r):
     """The mesh vertices (n, 3) over the domain that a finger can touch from outside, in the frame of r."""
-    vertices = np.vstack([*surface.vertices_near(r.frame.origin, 2.0 * r.radius)])
+    vertices = surface.vertices_near(r.frame.origin, 2.0 * r.radius)
     return r.frame.to_local(vertices[core.reachable(r.geometry, surface, vertices)])
 
 

@@ -15,10 +15,11 @@ from .report import report_operator
 from .scene import shown
 from .sidebar import dots, panel, preferences, rows
 from .stability_map import map_object, map_operator
-from .viewport import drag, gizmos, overlay, pick, tool
+from .viewport import drag, gizmos, overlay, pick
 from .whole_object import kept, object_operator, surface_operators
 
 CLASSES = (
+    probe.TactileProbe,
     operators.TACTILE_OT_reconstruct,
     in_slices.TACTILE_OT_stop,
     verify_operator.TACTILE_OT_verify,
@@ -38,6 +39,7 @@ CLASSES = (
     preferences.VIEW3D_MT_tactile,
     preferences.TactilePreferences,
 )
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
 MENUS = (
     *preferences.MENUS,
     *contact_operators.MENUS,
@@ -51,13 +53,11 @@ HERE = str(Path(__file__).resolve().parent)  # It holds presets/.
 
 
 def register() -> None:
-    probe.register()
+    dots.register()
+    _register_classes()
     for name, kind in PROPERTIES.items():
         setattr(bpy.types.Object, name, kind)
-    dots.register()
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-    tool.register()
+    pick.register_tool()
     preferences.restore_tab()
     for menu, draw in MENUS:
         getattr(bpy.types, menu).append(draw)
@@ -77,11 +77,9 @@ def unregister() -> None:
     bpy.utils.unregister_manual_map(preferences.manual_map)
     for menu, draw in MENUS:
         getattr(bpy.types, menu).remove(draw)
-    tool.unregister()
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+    pick.unregister_tool()
     kept.forget()
-    dots.unregister()
     for name in PROPERTIES:
         delattr(bpy.types.Object, name)
-    probe.unregister()
+    _unregister_classes()
+    dots.unregister()

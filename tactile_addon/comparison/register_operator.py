@@ -18,7 +18,6 @@ from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, report_done, target_object
 from ..scene import patch_record
 from ..touch.detached_mesh import DetachedMesh
-from ..touch.touch_report import Registration
 from ..touch.types import Object, Outcome
 from ..touch.wording import registration_summary
 from .verify_operator import chosen_mesh
@@ -77,7 +76,7 @@ class Search:
             raise self._error
         return self._found
 
-    def put(self, pose: int) -> Registration:
+    def put(self, pose: int) -> dict[str, Any]:
         """Moves the patch to one of the poses, and returns its `registration`, a dict."""
         if pose > len(self.poses):
             poses = many(len(self.poses), "pose", "poses")
@@ -99,7 +98,7 @@ class Search:
 
 def register_patch(
     patch: Object, target: Object, depsgraph: bpy.types.Depsgraph, pose: int = 1
-) -> Registration:
+) -> dict[str, Any]:
     """Moves the patch object to where its contacts are nearest to the mesh object `target`.
 
     pose : 1 for the best place, up to POSES for others

@@ -61,7 +61,7 @@ class Verification:
     def steps(self) -> Generator[None, None, None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
         r = self._r
-        vertices = np.vstack([*self._surface.vertices_near(r.frame.origin, 2.0 * r.radius)])
+        vertices = self._surface.vertices_near(r.frame.origin, 2.0 * r.radius)
         self.count, seen = len(vertices), [np.empty((0, 3))]
         yield
         for start in range(0, self.count, VERTICES_AT_ONCE):

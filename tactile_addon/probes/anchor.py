@@ -8,11 +8,13 @@ not do. So it stays where it is when the target is deleted, and is not sheared w
 
 import math
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from mathutils import Matrix
 
 from ..scene import patch_record
+from ..touch.touch_object import reference_axes
 from ..touch.types import Array, Object
 
 BASE = "tactile_base"  # A patch's custom property: its target's matrix and its own when it was touched.
@@ -20,23 +22,16 @@ SEAT = 20  # The count of numbers for the place in the target, directions there,
 CLOSE = 1e-5  # A smaller change of a number, or of a length as a share of the extent, is rounding of float32.
 
 
-def attach(probe: Object, target: Object) -> None:
-    """Makes the probe a child of its target without moving it, unless the target depends on the probe."""
-    above = target
-    while above is not None:
-        if above == probe:
-            return
-        above = above.parent
+def attach(probe: Object, target: Object | None) -> None:
+    """Makes the probe a child of its target, or of nothing, without moving it.
+
+    A target that depends on the probe is left alone.
+    """
+    if target == probe or target in probe.children_recursive:
+        return
     place = probe.matrix_world.copy()
     probe.parent, probe.parent_type = target, "OBJECT"
     patch_record.place(probe, place)
-
-
-def detach(probe: Object) -> None:
-    """Takes the probe's parent away without moving the probe."""
-    place = probe.matrix_world.copy()
-    probe.parent = None
-    probe.matrix_world = probe.matrix_basis = place
 
 
 def is_attached(probe: Object) -> bool:
@@ -45,9 +40,15 @@ def is_attached(probe: Object) -> bool:
     return target is not None and probe.parent == target and probe.parent_type == "OBJECT"
 
 
-def can_have_children(probe: Object) -> bool:
+def can_have_children(obj: Object) -> bool:
     """Whether children of an object can be placed: not if its scale is 0 or not finite."""
-    return all(0.0 < abs(scale) < math.inf for scale in probe.matrix_world.to_scale())
+    return all(0.0 < abs(scale) < math.inf for scale in obj.matrix_world.to_scale())
+
+
+def placed(place: Array, axes: Array, scale: Any = None) -> Matrix:
+    """The matrix of a probe at a place of the world (3,), with axes as of touch_object.reference_axes."""
+    e1, n, across = axes.T
+    return Matrix.LocRotScale(place.tolist(), Matrix(np.column_stack([e1, -across, n]).tolist()), scale)
 
 
 def put(probe: Object, matrix: Matrix) -> None:
@@ -76,12 +77,8 @@ def settle(probe: Object, extent: float) -> None:
     at, x, z = (to_world[:3, :3] @ np.reshape(seat(probe, extent)[:9], (3, 3)).T).T
     if not np.isfinite([at, x, z]).all():
         return
-    z /= np.linalg.norm(z)
-    x -= (x @ z) * z
-    x /= np.linalg.norm(x)
-    turn = Matrix(np.column_stack([x, np.cross(z, x), z]).tolist())
-    scale = probe.matrix_basis.to_scale()
-    patch_record.place(probe, Matrix.LocRotScale((at + to_world[:3, 3]).tolist(), turn, scale))
+    place = at + to_world[:3, 3]
+    patch_record.place(probe, placed(place, reference_axes(z, x), probe.matrix_basis.to_scale()))
 
 
 @np.errstate(all="ignore")  # Objects may be beyond all numbers.
@@ -137,15 +134,13 @@ def carry(probe: Object, patch: Object) -> None:
         return
     before, frame = np.reshape(base, (2, 4, 4))
     now = np.array(target.matrix_world, dtype=float)
-    if not (np.isfinite(now).all() and np.isfinite(before).all()):  # They are beyond single precision.
-        return
     try:
         motion = now @ np.linalg.inv(before)
     except np.linalg.LinAlgError:
         return
-    turn = np.array(Matrix(motion.tolist()).to_quaternion().to_matrix(), dtype=float)
-    if not np.isfinite(motion).all():
+    if not np.isfinite(motion).all():  # They are beyond single precision.
         return
+    turn = np.array(Matrix(motion.tolist()).to_quaternion().to_matrix(), dtype=float)
     origin = motion[:3, :3] @ frame[:3, 3] + motion[:3, 3]
     patch_record.move_record(patch, turn @ frame[:3, :3], origin)
 

@@ -18,10 +18,10 @@ from bpy.app.handlers import persistent
 from ..scene import undo
 from ..scene.family import remembered
 from ..scene.viewports import has_gesture
-from ..touch.settings import is_silent, something_happened
+from ..touch.settings import is_silent
 from ..touch.types import Object
 from . import anchor, deleted
-from .probe import forget_targets, is_probe, lock_of, probe_of, record_of, targets
+from .probe import is_probe, lock_of, probe_of, record_of, targets
 from .touch_again import is_outdated, may_be_outdated, measure_shape, stand_by, update
 
 SETTLE = 0.25  # A gesture counts as ended after this many seconds without a change.
@@ -46,14 +46,7 @@ def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> N
 
 def _bring_up_to_date(depsgraph: bpy.types.Depsgraph, dearest: float) -> None:
     """Touches again if the last touch took at most `dearest` seconds; other patches say "outdated"."""
-    global _unsure
-    something_happened()
-    if is_silent() or not (targets() or _unsure):
-        return
-    if depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
-        return
-    if not targets():
-        _unsure = False
+    if is_silent() or not targets() or depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
         return
     with remembered(), undo.after_step():
         concerned, unsure = _concerned(depsgraph)
@@ -67,7 +60,7 @@ def _bring_up_to_date(depsgraph: bpy.types.Depsgraph, dearest: float) -> None:
         end = perf_counter() + EVENT_SLICE
         for probe in (probe for probe in concerned if lock_of(probe) is None):
             in_time = bpy.app.background or (perf_counter() < end and _seconds(probe) <= dearest)
-            _look_at(probe, depsgraph, reshaped, in_time)
+            _look_at(probe, depsgraph, reshaped, in_time, bpy.app.background)
 
 
 def _seconds(probe: Object) -> float:
@@ -77,21 +70,30 @@ def _seconds(probe: Object) -> float:
 
 
 def _look_at(
-    probe: Object, depsgraph: bpy.types.Depsgraph, reshaped: dict[Any, int | None], in_time: bool
-) -> None:
-    """Brings a probe up to date, or notes it for the end of the gesture if there is no time now."""
+    probe: Object,
+    depsgraph: bpy.types.Depsgraph,
+    reshaped: dict[Any, int | None],
+    in_time: bool,
+    complete: bool,
+) -> bool:
+    """Brings a probe up to date, or notes it for the end of the gesture; returns whether it was touched.
+
+    in_time : whether there is time for a touch now
+    complete : whether to do the slow part, too
+    """
     settings = probe.tactile_probe
     deleted.relink(probe)
     deleted.forget_target(probe)
     measure_shape(settings, depsgraph, reshaped)
     outdated = is_outdated(probe, depsgraph)
-    if outdated and settings.live and in_time:
-        update(probe, depsgraph, complete=bpy.app.background)
+    is_due = (outdated and settings.live) or (complete and is_pending(probe))
+    if is_due and in_time:
+        update(probe, depsgraph, complete)
     else:
-        stand_by(probe, outdated, complete=bpy.app.background)
-    late = outdated and settings.live and not in_time
-    if not bpy.app.background and (late or is_pending(probe) or anchor.is_carried(probe)):
+        stand_by(probe, outdated, complete)
+    if not complete and (is_due or is_pending(probe) or anchor.is_carried(probe)):
         _settle_soon()
+    return is_due and in_time
 
 
 @persistent
@@ -107,15 +109,10 @@ def on_blend_import(imported: Any) -> None:
 def on_other_data(*_: Any) -> None:
     """Notes that after undo, or when a file was opened, any probe may be there and any patch may differ."""
     global _unsure
-    forget_targets()
+    targets.cache_clear()
     _unsure = True
     if not bpy.app.background:  # There may be no update otherwise.
         _settle_soon()
-
-
-def _has_come_or_gone(depsgraph: bpy.types.Depsgraph) -> bool:
-    """Whether an object may have come or gone, because its scene and collections are updated then."""
-    return any(isinstance(u.id, bpy.types.Scene | bpy.types.Collection) for u in depsgraph.updates)
 
 
 def _concerned(depsgraph: bpy.types.Depsgraph) -> tuple[list[Object], bool]:
@@ -132,14 +129,15 @@ def _concerned(depsgraph: bpy.types.Depsgraph) -> tuple[list[Object], bool]:
     # When an object comes or goes, all others are among the updates, too, but with neither of these two
     # flags. So is an object that is renamed.
     named = {u.id.name for u in updates if isinstance(u.id, bpy.types.Object)}
-    scene = unsure or _has_come_or_gone(depsgraph)
+    # Scene and collections are updated when an object may have come or gone.
+    scene = unsure or any(isinstance(u.id, bpy.types.Scene | bpy.types.Collection) for u in updates)
     if not (scene or owners or len(named) > len(objects) or any(o.session_uid in known for o in objects)):
         return [], False
     _unsure, _seen = False, layer
     there: set[Object] = set(depsgraph.view_layer.objects)
     found = [obj for obj in there if is_probe(obj)]
     if scene and not found:
-        forget_targets()  # The last one may have been deleted.
+        targets.cache_clear()  # The last one may have been deleted.
     concerned = [
         obj
         for obj in sorted(found, key=lambda probe: probe.name)
@@ -180,13 +178,8 @@ def _settle() -> float | None:
                 on_depsgraph_update(window.scene, depsgraph)
             objects: list[Object] = list(window.view_layer.objects)
             for probe in (obj for obj in objects if is_probe(obj) and lock_of(obj) is None):
-                outdated = is_outdated(probe, depsgraph)
-                if (outdated and probe.tactile_probe.live) or is_pending(probe):
-                    update(probe, depsgraph, complete=True)
-                    if perf_counter() > end:
-                        return 0.01
-                else:
-                    stand_by(probe, outdated, complete=True)
+                if _look_at(probe, depsgraph, {}, in_time=True, complete=True) and perf_counter() > end:
+                    return 0.01
     return None
 
 

@@ -33,7 +33,7 @@ def forget_target(probe: Object) -> None:
         return
     settings.lost = f"{target.session_uid} {int(anchor.is_attached(probe))} {target.name}"
     if anchor.is_attached(probe):  # The object is in no scene any more.
-        anchor.detach(probe)
+        anchor.attach(probe, None)
     settings.property_unset("target")
     if not target.users:
         _deleted.add(target.session_uid)
@@ -46,12 +46,8 @@ def _follow(probe: Object, target: Object) -> None:
     Its override may be in a scene, or it may be in one of its own file. The override takes the place of the
     object, unless it was made only because the probe refers to the object.
     """
-    if target.override_library is not None:
-        there = [target.override_library.reference]
-    else:
-        overrides = (obj for obj in bpy.data.objects if obj.override_library is not None)
-        there = [obj for obj in overrides if obj.override_library.reference == target]
-    found = next((obj for obj in there if obj.users_scene), None)
+    alike = (obj for obj in bpy.data.objects if obj.users_scene and _source(obj) == _source(target))
+    found = next(alike, None)
     if found is None:
         return
     was_attached = anchor.is_attached(probe)
@@ -59,6 +55,11 @@ def _follow(probe: Object, target: Object) -> None:
         probe.tactile_probe.target = found
     if was_attached:
         anchor.attach(probe, found)
+
+
+def _source(obj: Object) -> Object:
+    """The object of a library that another overrides, or the object itself."""
+    return obj if obj.override_library is None else obj.override_library.reference
 
 
 def remove_soon() -> None:

@@ -90,7 +90,7 @@ class InSlices(OperatorMixin):
         _running.append(self)
         self._begun = perf_counter()
         self._timer = context.window_manager.event_timer_add(NEXT, window=context.window)
-        context.workspace.status_text_set(_status(self.stop, *self._said()))
+        context.workspace.status_text_set(_draw_status)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -102,7 +102,7 @@ class InSlices(OperatorMixin):
             return self.meanwhile
         try:
             if not self._advance(context, self._slice()):
-                context.workspace.status_text_set(_status(self.stop, *self._said()))
+                context.workspace.status_text_set(_draw_status)  # This has it drawn again.
                 redraw_sidebars(context)
                 return self.meanwhile
             self._leave(context)
@@ -179,7 +179,14 @@ def draw_running(layout: bpy.types.UILayout) -> None:
     for operator in _running[-1:]:
         words, share = operator._said()
         layout.progress(factor=share or 0.0, text=words, translate=False)
-        layout.operator(TACTILE_OT_stop.bl_idname, text=operator.stop, icon="CANCEL")
+        layout.operator(TACTILE_OT_stop.bl_idname, text=operator.stop, icon="EVENT_ESC")
+
+
+def _draw_status(header: Any, context: bpy.types.Context) -> None:
+    """Draws the same in the status bar; it may outlive the operator by a redraw."""
+    row = header.layout.row()
+    row.ui_units_x = 30
+    draw_running(row)
 
 
 def redraw_sidebars(context: bpy.types.Context) -> None:
@@ -220,21 +227,3 @@ class AllOver(InSlices):
         except ValueError as error:
             words = sentence(error)
         layout.label(text=words, translate=False)
-
-
-def _status(stop: str, words: str, share: float | None) -> Callable[[Any, bpy.types.Context], None]:
-    """The function that draws the status bar meanwhile; it may outlive the operator by a redraw."""
-
-    def draw(header: Any, context: bpy.types.Context) -> None:
-        layout = header.layout
-        layout.label(text="", icon="EVENT_ESC")
-        layout.label(text=f" {stop}")
-        if share is None:
-            layout.label(text=words, translate=False)
-        else:
-            row = layout.row()
-            row.ui_units_x = 16
-            row.progress(factor=share, text=words, translate=False)
-        layout.separator_spacer()
-
-    return draw

@@ -27,6 +27,8 @@ may differ afterward.
                      and touches then if there was no time before
 """
 
+from functools import cache
+
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -94,34 +96,25 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
     lost: StringProperty(description="Data of a target that was deleted", options={"HIDDEN"})
 
 
-# The session_uids of the probes' targets, 0 for none; None if they are to be looked up.
-_targets: set[int] | None = None
-
-
+@cache
 def targets() -> set[int]:
-    """The session_uids of the targets of all probes in this file; 0 for a probe without target."""
-    global _targets
-    if _targets is None:
-        of = (obj.tactile_probe.target for obj in all_objects() if is_probe(obj))
-        _targets = {0 if target is None else target.session_uid for target in of}
-    return _targets
+    """The session_uids of the targets of all probes in this file; 0 for a probe without target.
 
-
-def forget_targets() -> None:
-    """Makes `targets` look again, because probes may have come or gone or changed their targets."""
-    global _targets
-    _targets = None
+    Its cache is cleared when probes may have come or gone or changed their targets.
+    """
+    of = (obj.tactile_probe.target for obj in all_objects() if is_probe(obj))
+    return {0 if target is None else target.session_uid for target in of}
 
 
 def _appointed(settings: TactileProbe, context: bpy.types.Context) -> None:
-    forget_targets()
+    targets.cache_clear()
     changed(settings, context)
 
 
 def _chosen(settings: TactileProbe, context: bpy.types.Context) -> None:
     """Makes a probe that was a child of its target a child of the new target."""
     if is_silent():  # It is the same target, which has come back or is an override now.
-        forget_targets()
+        targets.cache_clear()
         return
     settings.lost, probe, record = "", settings.id_data, record_of(settings.id_data)
     before = None if record is None else bpy.data.objects.get(record["source"])
@@ -184,24 +177,20 @@ def record_of(obj: Object) -> TouchReport | None:
     return None if patch is None else patch_record.report_of(patch)
 
 
-def require_unlocked(obj: Object) -> None:
-    """Raises ValueError if anything of the probe or patch near `obj` cannot be changed."""
-    for each in filter(None, (probe_of(obj), patch_near(obj))):
-        if not each.is_editable:
-            raise ValueError(
-                f'"{each.name}" comes from a library: make it local, or override it, to change it'
-            )
-        if each.type == "MESH" and each.data.is_editmode:
-            raise ValueError(f'"{each.name}" is being edited: leave its Edit Mode first')
-
-
 def lock_of(obj: Object) -> str | None:
     """A sentence on why the probe or patch near `obj` cannot be changed, or None if it can."""
-    try:
-        require_unlocked(obj)
-    except ValueError as error:
-        return str(error)
+    for each in filter(None, (probe_of(obj), patch_near(obj))):
+        if not each.is_editable:
+            return f'"{each.name}" comes from a library: make it local, or override it, to change it'
+        if each.type == "MESH" and each.data.is_editmode:
+            return f'"{each.name}" is being edited: leave its Edit Mode first'
     return None
+
+
+def require_unlocked(obj: Object) -> None:
+    """Raises ValueError if the probe or patch near `obj` cannot be changed."""
+    if lock := lock_of(obj):
+        raise ValueError(lock)
 
 
 def make(context: bpy.types.Context, target: Object) -> Object:
@@ -213,11 +202,6 @@ def make(context: bpy.types.Context, target: Object) -> Object:
     return probe
 
 
-def _show(obj: Object) -> None:
-    """Colors a patch by the quantity it is set to show now, without the range of the one before."""
-    shown.set_range(obj, 0.0)
-
-
 # Properties of objects, by name.
 PROPERTIES = {
     "tactile_probe": PointerProperty(type=TactileProbe, override=OVERRIDABLE),
@@ -226,7 +210,7 @@ PROPERTIES = {
         description="What the colors of the patch show",
         items=[item[:3] for item in patch_record.QUANTITIES],
         override=OVERRIDABLE,
-        update=lambda obj, _: _show(obj),
+        update=lambda obj, _: shown.set_range(obj, 0.0),  # That of the quantity before says nothing of this.
     ),
     "tactile_contours": BoolProperty(
         name="Contours",
@@ -245,12 +229,3 @@ PROPERTIES = {
         override=OVERRIDABLE,
     ),
 }
-
-
-def register() -> None:
-    """Registers the settings of probes, which PROPERTIES need."""
-    bpy.utils.register_class(TactileProbe)
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(TactileProbe)

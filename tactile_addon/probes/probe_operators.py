@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The buttons of the panels besides picking: planes, another touch, deletion, and a viewport with colors."""
+"""The buttons of the panels besides picking: planes, another touch, deletion."""
 
 import math
 from collections.abc import Mapping
@@ -10,11 +10,10 @@ import bpy
 from bpy.props import IntProperty, StringProperty
 
 from ..scene import patch_object, patch_record
-from ..scene.viewports import show_colors, shows_colors
 from ..touch import units
 from ..touch.settings import MOST_PLANES, TARGET, length_property, silent
 from ..touch.types import Object, OperatorMixin, Outcome
-from ..touch.wording import added_planes, verdict
+from ..touch.wording import added_planes
 from . import probe, touch_again
 from .operators import (
     is_in_object_mode,
@@ -178,7 +177,7 @@ class TACTILE_OT_add_subdivision(_ProbeOperator, bpy.types.Operator):
         return polls(cls, is_mesh, hint) and is_in_object_mode(cls, context, "Modifiers are added")
 
     def execute(self, context: bpy.types.Context) -> Outcome:
-        found, surface = probe.probe_of(context.view_layer.objects.active), surface_of(context)
+        surface = surface_of(context)
         try:
             target = target_object(context, self.target)
         except ValueError as error:
@@ -186,17 +185,11 @@ class TACTILE_OT_add_subdivision(_ProbeOperator, bpy.types.Operator):
         if not target.is_editable or target.type != "MESH":
             return report_error(self, ValueError("The target cannot be changed: make it local first"))
         _subdivide(target)
-        context.view_layer.update()
+        context.view_layer.update()  # Live probes touch again.
         if surface is not None:
             patch_record.mark_subdivided(surface)
             return report_done(self, f'"{target.name}" is subdivided: touch it all over again')
-        if found is None or self.target:
-            return {"FINISHED"}
-        touch_again.refresh(found, context)
-        if found.tactile_probe.message:
-            return report_error(self, ValueError(found.tactile_probe.message))
-        record = probe.record_of(found)
-        return report_done(self, verdict(record, units.unit_of_report(context.scene, record)))
+        return {"FINISHED"}
 
 
 def _subdivide(target: Object) -> None:
@@ -245,26 +238,6 @@ class TACTILE_OT_activate(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class TACTILE_OT_show_colors(bpy.types.Operator):
-    """Have this viewport draw the colors of the vertices, in Solid shading"""
-
-    bl_idname = "tactile.show_colors"
-    bl_label = "Show Patch Colors"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        space = context.space_data
-        return polls(cls, space and space.type == "VIEW_3D", "Use it in a 3D viewport") and polls(
-            cls, not shows_colors(space), "This viewport shows the colors of the patch already"
-        )
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        space: Any = context.space_data
-        space.shading.type = "SOLID"
-        show_colors(space)
-        return {"FINISHED"}
-
-
 OPERATORS = (
     TACTILE_OT_add_plane,
     TACTILE_OT_add_planes,
@@ -273,5 +246,4 @@ OPERATORS = (
     TACTILE_OT_add_subdivision,
     TACTILE_OT_delete,
     TACTILE_OT_activate,
-    TACTILE_OT_show_colors,
 )

@@ -30,9 +30,7 @@ def _put(probe: Object, touched: Touched) -> None:
     """
     if probe.constraints:
         return
-    location, (e1, n, across) = touched.result.point, np.transpose(touched.report["axes"])
-    turn = Matrix(np.column_stack([e1, -across, n]).tolist())
-    wanted = Matrix.LocRotScale(location.tolist(), turn.to_quaternion(), None)
+    wanted = anchor.placed(touched.result.point, np.array(touched.report["axes"]))
     old, new = (np.array(m, dtype=float) for m in (probe.matrix_world.normalized(), wanted))
     # If it were put there again and again, it would creep by rounding.
     near = 1e-5 * touched.report["extent"]

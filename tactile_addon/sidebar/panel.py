@@ -8,27 +8,13 @@ from typing import Any
 import bpy
 from bpy.app.translations import pgettext_iface as iface
 
-from ..comparison.register_operator import TACTILE_OT_register
 from ..comparison.verification_wording import verification_rows, verification_table
-from ..comparison.verify_operator import TACTILE_OT_verify
-from ..files.export_operators import TACTILE_OT_export_table
 from ..probes import probe
 from ..probes.in_slices import draw_running
 from ..probes.operators import NO_MESH
-from ..probes.probe_operators import (
-    TACTILE_OT_activate,
-    TACTILE_OT_add_plane,
-    TACTILE_OT_add_subdivision,
-    TACTILE_OT_delete,
-    TACTILE_OT_remove_plane,
-    TACTILE_OT_show_colors,
-    TACTILE_OT_update,
-)
-from ..report.report_operator import TACTILE_OT_export_report
 from ..scene import patch_record
 from ..scene.shown import unit_of_range
 from ..scene.viewports import shows_colors
-from ..stability_map.map_operator import TACTILE_OT_stability_map
 from ..stability_map.map_report import facets as map_facets
 from ..stability_map.map_report import map_rows, median_rows
 from ..touch import units
@@ -37,14 +23,7 @@ from ..touch.touch_report import TouchReport
 from ..touch.types import Object, PanelMixin
 from ..touch.units import Unit
 from ..touch.wording import curvatures, reasons, registration_summary, verdict
-from ..viewport.pick import TACTILE_OT_pick
-from ..whole_object.object_operator import TACTILE_OT_touch_all_over
 from ..whole_object.object_report import deviation, facets, is_all_within, object_rows, object_verdict
-from ..whole_object.surface_operators import (
-    TACTILE_OT_continue_touching,
-    TACTILE_OT_look_farthest,
-    TACTILE_OT_mesh_again,
-)
 from .dots import dot
 from .patch_rows import found_values, main_rows, other_rows, plane_rows
 from .rows import draw_rows, draw_sentence
@@ -85,9 +64,9 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         row = layout.row(align=True)
         move = row.row(align=True)
         move.enabled = probe.lock_of(found) is None
-        move.operator(TACTILE_OT_pick.bl_idname, text="Move", icon="EYEDROPPER")
-        row.operator(TACTILE_OT_pick.bl_idname, text="New", icon="ADD").new = True
-        row.operator(TACTILE_OT_delete.bl_idname, text="", icon="TRASH")
+        move.operator("tactile.pick", text="Move", icon="EYEDROPPER")
+        row.operator("tactile.pick", text="New", icon="ADD").new = True
+        row.operator("tactile.delete", text="", icon="TRASH")
         settings, record = found.tactile_probe, probe.record_of(found)
         layout.prop(settings, "target")
         chosen = found_values(record, context.scene)
@@ -95,7 +74,7 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         _draw_planes(context, layout, settings)
         row = layout.row()
         row.prop(settings, "live", text="Live" if settings.live else "Live (Frozen)")
-        row.operator(TACTILE_OT_update.bl_idname, text="", icon="FILE_REFRESH")
+        row.operator("tactile.update", text="", icon="FILE_REFRESH")
         if body := _folded(layout, "fit", "Sensor and Fit"):
             draw_chosen(body, settings, "step", chosen)
             draw_noise(body, settings)
@@ -111,7 +90,7 @@ def _folded(layout: bpy.types.UILayout, identifier: str, title: str) -> bpy.type
 
 def _draw_pick(context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
     """Draws the button that makes a probe, and what it does or needs."""
-    layout.operator(TACTILE_OT_pick.bl_idname, icon="EYEDROPPER")
+    layout.operator("tactile.pick", icon="EYEDROPPER")
     if not any(each.type == "MESH" for each in context.view_layer.objects):
         draw_sentence(context, layout, NO_MESH, "INFO")
     elif obj is None or not probe.is_result(obj):
@@ -126,7 +105,7 @@ def _draw_planes(context: bpy.types.Context, layout: bpy.types.UILayout, setting
     heading.label(text="", icon="BLANK1")
     for text in ("Azimuth", "Tilt") if is_wide else ("Azimuth",):
         heading.label(text=text)
-    heading.operator(TACTILE_OT_add_plane.bl_idname, text="", icon="ADD")
+    heading.operator("tactile.add_plane", text="", icon="ADD")
     for i in range(settings.plane_count):
         row = column.row(align=True)
         row.use_property_split = False
@@ -134,7 +113,7 @@ def _draw_planes(context: bpy.types.Context, layout: bpy.types.UILayout, setting
         row.prop(settings, "azimuths", index=i, text="")
         if is_wide:
             row.prop(settings, "tilts", index=i, text="")
-        row.operator(TACTILE_OT_remove_plane.bl_idname, text="", icon="REMOVE").plane = i
+        row.operator("tactile.remove_plane", text="", icon="REMOVE").plane = i
 
 
 class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
@@ -176,9 +155,9 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
 def _draw_remedy(layout: bpy.types.UILayout, record: Mapping[str, Any]) -> None:
     """Draws the button that helps a probe's patch which is outdated, or felt few facets."""
     if record["status"] == "outdated":
-        layout.operator(TACTILE_OT_update.bl_idname, icon="FILE_REFRESH")
+        layout.operator("tactile.update", icon="FILE_REFRESH")
     elif FACETED.intersection(doubt["code"] for doubt in record["doubts"]):
-        layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
+        layout.operator("tactile.add_subdivision", icon="MOD_SUBSURF")
 
 
 class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
@@ -186,7 +165,7 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
     bl_label = "Whole Object"
 
     def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
-        layout.operator(TACTILE_OT_touch_all_over.bl_idname, icon="MESH_UVSPHERE")
+        layout.operator("tactile.touch_all_over", icon="MESH_UVSPHERE")
         draw_running(layout)
         if obj is None or patch_record.ATLAS_RECORD not in obj:
             return
@@ -196,23 +175,19 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         draw_sentence(context, layout, object_verdict(record), icon)
         if words := facets(record):
             draw_sentence(context, layout, words, "INFO")
-            layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
+            layout.operator("tactile.add_subdivision", icon="MOD_SUBSURF")
         if record.get("uncovered") and record["status"] != "outdated":
-            layout.operator(TACTILE_OT_continue_touching.bl_idname, icon="PLAY")
+            layout.operator("tactile.continue_touching", icon="PLAY")
         _draw_colors(context, layout, obj, "tactile_colors")
         if "touches" in record:  # Measured contacts have no mesh to touch.
             text = f"Largest {'Gap' if record['uncovered'] else 'Deviation'}: {deviation(record, 'max')}"
-            layout.operator(
-                TACTILE_OT_look_farthest.bl_idname, text=text, icon="ZOOM_SELECTED", translate=False
-            )
-            layout.operator(
-                TACTILE_OT_pick.bl_idname, text="Probe on the Surface", icon="EYEDROPPER"
-            ).new = True
+            layout.operator("tactile.look_farthest", text=text, icon="ZOOM_SELECTED", translate=False)
+            layout.operator("tactile.pick", text="Probe on the Surface", icon="EYEDROPPER").new = True
         if body := _folded(layout, "object_more", "More"):
             if patch_record.is_colored(obj):
                 _draw_range(context, body, obj)
             draw_rows(context, body, object_rows(record))
-            body.operator(TACTILE_OT_mesh_again.bl_idname, icon="MOD_REMESH")
+            body.operator("tactile.mesh_again", icon="MOD_REMESH")
 
 
 class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
@@ -220,10 +195,10 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
     bl_label = "Stability Map"
 
     def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
-        layout.operator(TACTILE_OT_stability_map.bl_idname, icon="SHADERFX")
+        layout.operator("tactile.stability_map", icon="SHADERFX")
         if obj is None or patch_record.MAP_RECORD not in obj:
             return
-        layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Map", icon="EYEDROPPER").new = True
+        layout.operator("tactile.pick", text="Probe on the Map", icon="EYEDROPPER").new = True
         record = obj[patch_record.MAP_RECORD]
         unit = units.unit_of_report(context.scene, record)
         if words := map_facets(record):
@@ -250,13 +225,11 @@ class TACTILE_PT_probes(_Sidebar, bpy.types.Panel):
             if record is not None:
                 words = curvatures(record, units.unit_of_report(context.scene, record))
             text, is_active = f"{found.name}   {words}", found == probe.probe_of(obj)
-            go = column.operator(
-                TACTILE_OT_activate.bl_idname, text=text, icon=icon, depress=is_active, translate=False
-            )
+            go = column.operator("tactile.activate", text=text, icon=icon, depress=is_active, translate=False)
             go.name = found.name
         row = layout.row(align=True)
-        row.operator(TACTILE_OT_export_table.bl_idname, text="Table", icon="EXPORT")
-        row.operator(TACTILE_OT_export_report.bl_idname, text="Report", icon="FILE_TEXT")
+        row.operator("tactile.export_table", text="Table", icon="EXPORT")
+        row.operator("tactile.export_report", text="Report", icon="FILE_TEXT")
 
 
 def _draw_more(
@@ -270,14 +243,18 @@ def _draw_more(
     rows = [*other_rows(record, unit), *plane_rows(record, unit)]
     draw_rows(context, layout, rows, active=is_current)
     if probe.probe_of(patch) is not None:
-        layout.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
+        layout.operator("tactile.verify", icon="VIEWZOOM")
 
 
 def _draw_colors(context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object, name: str) -> None:
     """Draws what the colors show, and a button if the viewport does not show them."""
     layout.prop(obj, name)
-    if not shows_colors(context.space_data):
-        layout.operator(TACTILE_OT_show_colors.bl_idname, icon="SHADING_SOLID")
+    space: Any = context.space_data
+    if not shows_colors(space):
+        shown = ("type", "SOLID") if space.shading.type == "WIREFRAME" else ("color_type", "VERTEX")
+        row = layout.row()
+        row.use_property_split = False
+        row.prop_enum(space.shading, *shown, text="Show Patch Colors", icon="SHADING_SOLID")
 
 
 def _draw_range(context: bpy.types.Context, layout: bpy.types.UILayout, patch: Object) -> None:
@@ -305,8 +282,8 @@ def _draw_comparison(
     """Draws where the patch was put on a mesh, and how far it is off one, if these are known."""
     if probe.probe_of(patch) is None:
         layout.prop_search(patch, "tactile_target", context.scene, "objects")
-        layout.operator(TACTILE_OT_register.bl_idname, icon="SNAP_ON")
-        layout.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
+        layout.operator("tactile.register", icon="SNAP_ON")
+        layout.operator("tactile.verify", icon="VIEWZOOM")
     if "registration" in record:
         draw_sentence(context, layout, registration_summary(record["registration"], unit), "SNAP_ON")
     if "verification" not in record:
@@ -314,13 +291,8 @@ def _draw_comparison(
     layout = layout.column()
     layout.active = record["status"] != "outdated"
     layout.label(text=record["verification"]["target"], icon="MESH_DATA", translate=False)
-    column = layout.column(align=True)
-    for label, *values in verification_table(record, unit):
-        row = column.row(align=True).split(factor=0.31, align=True)
-        row.label(text=label)
-        row = row.row(align=True)
-        for value in values:
-            row.label(text=value)
+    table = [(label, " | ".join(values)) for label, *values in verification_table(record, unit)]
+    draw_rows(context, layout, table)
     draw_rows(context, layout, verification_rows(record, unit))
 
 

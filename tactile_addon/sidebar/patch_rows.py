@@ -10,7 +10,7 @@ import bpy
 from ..touch import units
 from ..touch.touch_report import TouchReport
 from ..touch.units import Unit
-from ..touch.wording import is_flat
+from ..touch.wording import is_flat, measured, said
 
 FLAT_DEVIATIONS = 2.0  # A curvature within this many deviations of 0 has no radius.
 FLATTEST = 1e-3  # Nor has one whose radius is a thousand times the patch's.
@@ -18,7 +18,7 @@ FLATTEST = 1e-3  # Nor has one whose radius is a thousand times the patch's.
 
 def main_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     """(label, value) of the principal curvatures, with lengths in a unit of units.py."""
-    return [(label, _measured(record, key, -1, unit)) for label, key in (("κ1", "k1"), ("κ2", "k2"))]
+    return [(label, measured(record, key, -1, unit)) for label, key in (("κ1", "k1"), ("κ2", "k2"))]
 
 
 def other_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
@@ -27,16 +27,16 @@ def other_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     rows = [
         ("Height", f"± {units.say(record['height_std'], 1, unit)}"),
         ("At the Rim", "…" if rim is None else f"± {units.say(rim, 1, unit)}"),
-        ("Deviation", _said(record, "height_error", 1, unit) if "height_error" in record else "–"),
+        ("Deviation", said(record, "height_error", 1, unit) if "height_error" in record else "–"),
         *_radii(record, unit),
-        ("K Gaussian", _measured(record, "gaussian_curvature", -2, unit)),
-        ("H Mean", _measured(record, "mean_curvature", -1, unit)),
+        ("K Gaussian", measured(record, "gaussian_curvature", -2, unit)),
+        ("H Mean", measured(record, "mean_curvature", -1, unit)),
         ("Shape Index", _shape_index(record)),
-        ("Curvedness", _said(record, "curvedness", -1, unit)),
-        ("Fit Error", _said(record, "fit_error", 1, unit)),
+        ("Curvedness", said(record, "curvedness", -1, unit)),
+        ("Fit Error", said(record, "fit_error", 1, unit)),
     ]
     if record["is_verified"] and record["vertices"]:
-        rows.append(("Farthest", _said(record, "vertex_distance_max", 1, unit)))
+        rows.append(("Farthest", said(record, "vertex_distance_max", 1, unit)))
     lengths = ("extent", "step") if "step" in record else ("radius",)
     rows += [(key.title(), units.say(record[key], 1, unit)) for key in lengths]
     return [*rows, ("Degree", str(record["degree"])), ("Contacts", str(record["contacts"]))]
@@ -62,24 +62,9 @@ def found_values(record: Mapping[str, Any] | None, scene: bpy.types.Scene) -> di
     return lengths | {"degree": str(record["degree"])}
 
 
-def _said(record: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
-    """A value of the record, which is in length^power, in words."""
-    return units.say(_value(record, key, power), power, unit)
-
-
 def _shape_index(record: Mapping[str, Any]) -> str:
     """The shape index in words; a flat patch has none."""
     return "–" if is_flat(record) else f"{record['shape_index']:.2f}"
-
-
-def _measured(record: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
-    """A value of the record, which is in length^power, in words with its standard deviation."""
-    return units.say(_value(record, key, power), power, unit, record[f"{key}_std"])
-
-
-def _value(record: Mapping[str, Any], key: str, power: int) -> float:
-    """A value of the record, which is in length^power, as `units.rounded` has it."""
-    return units.rounded(record[key], power, record["radius"])
 
 
 def _radii(record: Mapping[str, Any], unit: Unit) -> Iterator[tuple[str, str]]:

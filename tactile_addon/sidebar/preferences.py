@@ -8,18 +8,13 @@ from typing import Any
 import bpy
 from bpy.props import StringProperty
 
-from ..comparison.register_operator import TACTILE_OT_register
-from ..comparison.verify_operator import TACTILE_OT_verify
-from ..probes.operators import TACTILE_OT_reconstruct
-from ..probes.probe_operators import (
-    TACTILE_OT_add_plane,
-    TACTILE_OT_add_planes,
-    TACTILE_OT_delete,
-    TACTILE_OT_update,
-)
-from ..stability_map.map_operator import TACTILE_OT_stability_map
-from ..viewport.pick import TACTILE_OT_pick
 from .panel import PANELS, TAB
+
+ENTRIES = (
+    *("tactile.pick", "tactile.reconstruct", "tactile.stability_map", ""),
+    *("tactile.verify", "tactile.register", ""),
+    *("tactile.add_plane", "tactile.add_planes", "tactile.update", "tactile.delete"),
+)
 
 
 class VIEW3D_MT_tactile(bpy.types.Menu):
@@ -27,15 +22,11 @@ class VIEW3D_MT_tactile(bpy.types.Menu):
     bl_label = "Tactile Patch"
 
     def draw(self, context: bpy.types.Context) -> None:
-        operator: type[Any]
-        for operator in (TACTILE_OT_pick, TACTILE_OT_reconstruct, TACTILE_OT_stability_map):
-            self.layout.operator(operator.bl_idname)
-        self.layout.separator()
-        for operator in (TACTILE_OT_verify, TACTILE_OT_register):
-            self.layout.operator(operator.bl_idname)
-        self.layout.separator()
-        for operator in (TACTILE_OT_add_plane, TACTILE_OT_add_planes, TACTILE_OT_update, TACTILE_OT_delete):
-            self.layout.operator(operator.bl_idname)
+        for operator in ENTRIES:
+            if operator:
+                self.layout.operator(operator)
+            else:
+                self.layout.separator()
 
 
 def _draw_in_object(self: bpy.types.Menu, context: bpy.types.Context) -> None:
@@ -45,7 +36,7 @@ def _draw_in_object(self: bpy.types.Menu, context: bpy.types.Context) -> None:
 
 def _draw_in_add(self: bpy.types.Menu, context: bpy.types.Context) -> None:
     self.layout.separator()
-    self.layout.operator(TACTILE_OT_reconstruct.bl_idname, icon="SURFACE_DATA")
+    self.layout.operator("tactile.reconstruct", icon="SURFACE_DATA")
 
 
 MENUS = (("VIEW3D_MT_object", _draw_in_object), ("VIEW3D_MT_mesh_add", _draw_in_add))

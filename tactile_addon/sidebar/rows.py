@@ -90,20 +90,17 @@ def draw_rows(
     rows: Sequence[tuple[str, str]],
     active: bool = True,
 ) -> None:
-    """Draws labels and values side by side, gray if they are not active; a heading has no value.
+    """Draws labels and values side by side, gray if they are not active.
 
     A value that has no room to the right of its label stands below it.
     """
-    longest = max((len(label) for label, value in rows if value), default=0)
+    longest = max((len(label) for label, _ in rows), default=0)
     share = min(max((longest + 3) / _letters(context), 0.34), 0.66)
     room = (1.0 - share) * _letters(context) * LETTER - PADDING
     blf.size(FONT, TEXT)
     column = layout.column(align=True)
     column.active = active
     for label, value in rows:
-        if not value:
-            column.label(text=label)
-            continue
         is_long = blf.dimensions(FONT, value)[0] > room
         line = column if is_long else column.split(factor=share, align=True)
         left = line.row(align=True)

@@ -14,7 +14,7 @@ from mathutils.bvhtree import BVHTree
 
 from ... import core
 from .arrays import read_array
-from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, require_in_scene
+from .evaluated_mesh import PlacedMesh, coordinates, evaluated_object, require_in_scene
 from .oriented import require_oriented
 from .types import Array, Object, Point, Triple
 
@@ -65,11 +65,9 @@ class DetachedMesh(PlacedMesh):
         self.points = co @ linear.T
         scale = np.linalg.norm(linear, axis=0).mean()
         if np.allclose(linear.T @ linear, scale**2 * np.eye(3), rtol=0.0, atol=SIMILAR * scale**2):
-            try:
-                # Its rays take half the time of the object's own.
-                self._tree = BVHTree.FromObject(obj, depsgraph)
-            except ValueError as error:
-                raise disabled(obj) from error
+            self._tree = BVHTree.FromObject(
+                obj, depsgraph
+            )  # Its rays take half the time of the object's own.
         else:
             self._tree, linear = _tree_in_world(mesh, linear), np.eye(3)
         rays = self._tree.ray_cast

@@ -24,12 +24,7 @@ def checksum_of(obj: Object, depsgraph: bpy.types.Depsgraph) -> int:
     Raises ValueError, with a sentence, if the object cannot be touched.
     """
     evaluated, _, _ = evaluated_object(obj, depsgraph)
-    co = coordinates(evaluated)
-    try:  # This ray starts beyond everything, so it needs an evaluated mesh, but no tree of its faces.
-        evaluated.ray_cast((1e18, 0.0, 0.0), (1.0, 0.0, 0.0), distance=1e-30, depsgraph=depsgraph)
-    except RuntimeError as error:
-        raise disabled(obj) from error
-    return zlib.crc32(co.data)
+    return zlib.crc32(coordinates(evaluated).data)
 
 
 def is_disabled(obj: Object) -> bool:
@@ -59,7 +54,7 @@ def require_in_scene(obj: Object) -> None:
 def evaluated_object(obj: Object, depsgraph: bpy.types.Depsgraph) -> tuple[Object, Array, Array]:
     """The evaluated object and its transform: linear part and origin.
 
-    Raises ValueError, with a sentence, if it cannot be touched for another reason than that it is disabled.
+    Raises ValueError, with a sentence, if it cannot be touched.
     """
     if obj.type != "MESH":
         raise ValueError(f'"{obj.name}" is not a mesh: select a mesh object, or convert this one')
@@ -70,6 +65,10 @@ def evaluated_object(obj: Object, depsgraph: bpy.types.Depsgraph) -> tuple[Objec
         # The evaluated mesh is an empty shell around the edited one until `to_mesh` makes it.
         evaluated.to_mesh()
         evaluated.to_mesh_clear()
+    try:  # This ray starts beyond everything, so it needs an evaluated mesh, but no tree of its faces.
+        evaluated.ray_cast((1e18, 0.0, 0.0), (1.0, 0.0, 0.0), distance=1e-30, depsgraph=depsgraph)
+    except RuntimeError as error:
+        raise disabled(obj) from error
     matrix = np.array(evaluated.matrix_world, dtype=float)
     require_invertible(obj.name, matrix)
     if not len(evaluated.data.polygons):

@@ -67,28 +67,14 @@ def is_silent() -> bool:
     return _is_silent
 
 
-_answered = None  # These settings of a probe were looked at last, and nothing has happened since.
-
-
 def changed(settings: Any, context: bpy.types.Context) -> None:
     """Makes the depsgraph handler look at a probe at once, so that the patch is in the same undo step.
 
     Blender calls this when a property with it as `update` changes; operators' settings are passed over.
     """
-    global _answered
-    if _is_silent or not isinstance(settings.id_data, Object) or not settings.is_probe:
-        return
-    now = repr((settings.id_data, settings.target, settings.live, touch_arguments(settings)))
-    if now != _answered:  # Blender calls this twice for a number of an array.
+    if not _is_silent and isinstance(settings.id_data, Object) and settings.is_probe:
         settings.id_data.update_tag()
         context.view_layer.update()
-        _answered = now
-
-
-def something_happened() -> None:
-    """Makes the next setting be looked at even if it is as it was."""
-    global _answered
-    _answered = None
 
 
 KEPT = {"update": changed, "override": OVERRIDABLE}  # A probe's properties need these, an operator's do not.

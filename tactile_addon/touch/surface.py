@@ -3,20 +3,17 @@
 """A mesh object of the scene as a surface to touch: as Blender evaluates it, in world coordinates."""
 
 import math
-from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
-from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, size_of
+from .evaluated_mesh import PlacedMesh, coordinates, evaluated_object, size_of
 from .oriented import require_oriented
 from .types import Array, Object, Point, Triple
 
 VERTICES_AT_ONCE = 100_000  # So many take some megabytes; ten million took 230.
-MANY = 8  # This multiple of the vertices that are needed is looked at first, before all are.
 WALK = 8  # The most steps on the way to the nearest point of a stretched object; mostly two or three do.
 AT_VERTEX = 1e-4  # A point that is nearer to a vertex than this share of its face's size is that vertex.
 SMOOTH = 0.77  # The cosine between the normals of a vertex and of each of its faces is more, but on a crease.
@@ -32,14 +29,7 @@ class MeshSurface(PlacedMesh):
 
     def __init__(self, obj: Object, depsgraph: bpy.types.Depsgraph, sound: bool = False) -> None:
         """Raises ValueError, with a sentence, if `obj` cannot be touched."""
-        try:
-            evaluated, linear, origin = evaluated_object(obj, depsgraph)
-            if not sound:
-                self._co = coordinates(evaluated)
-                require_oriented(evaluated, self._co)
-            evaluated.ray_cast((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), distance=1e-30, depsgraph=depsgraph)
-        except RuntimeError as error:
-            raise disabled(obj) from error
+        evaluated, linear, origin = evaluated_object(obj, depsgraph)
         rays = evaluated.ray_cast
 
         def cast(start: Point, direction: Point, distance: float) -> Any:
@@ -49,30 +39,29 @@ class MeshSurface(PlacedMesh):
         super().__init__(linear, origin, cast)
         self._mesh, self._object, self._depsgraph = evaluated.data, evaluated, depsgraph
         self.name, self.size = obj.name, size_of(evaluated, linear)
+        if not sound:
+            require_oriented(evaluated, self._co)
 
     @cached_property
     def _co(self) -> Array:
         return coordinates(self._object)
 
-    def vertices_near(self, point: Point, radius: float, most: int | None = None) -> Iterator[Array]:
-        """The vertices in the world within `radius` of a world point, in parts (n, 3), at least one.
+    def vertices_near(self, point: Point, radius: float, most: int | None = None) -> Array:
+        """The vertices (n, 3) in the world within `radius` of a world point.
 
         If these are more than `most`, there is only each second, third, ... of them.
         """
         # A sphere in the world is an ellipsoid in the object, which its longest axis bounds.
-        reach = float(radius * np.linalg.norm(self._inverse, ord=2))
-        at, few = self._to_local(point).astype(np.float32), len(self._co) // (MANY * (most or len(self._co)))
-        for stride in dict.fromkeys((max(few, 1), 1)):  # All are looked at only if some are not enough.
-            co = self._co[::stride]
-            is_near = _are_within(reach, at, co)
-            count = np.count_nonzero(is_near)
-            if most is not None and count >= most:
-                break
-        every, seen = 1 if most is None else max(math.ceil(count / most), 1), 0
-        for part in _parts(co):
-            near = co[part][is_near[part]]
-            yield near[-seen % every :: every] @ self._linear.T + self._origin
-            seen += len(near)
+        reach, at = radius * np.linalg.norm(self._inverse, ord=2), self._to_local(point).astype(np.float32)
+
+        def within(co: Array) -> Array:
+            local = co - at
+            return co[np.einsum("ij,ij->i", local, local) <= reach**2]
+
+        parts = np.array_split(self._co, len(self._co) // VERTICES_AT_ONCE + 1)
+        near = np.concatenate([within(part) for part in parts])
+        stride = 1 if most is None else max(math.ceil(len(near) / most), 1)
+        return near[::stride] @ self._linear.T + self._origin
 
     def project(self, location: Point) -> tuple[Triple, Triple, float]:
         """The (point, unit normal) of the mesh nearest to the world `location`, and the distance.
@@ -144,17 +133,3 @@ class MeshSurface(PlacedMesh):
         """The nearest (point, normal) in object coordinates."""
         found, point, normal, _ = self._object.closest_point_on_mesh(local, depsgraph=self._depsgraph)
         return (point, normal) if found else (None, None)
-
-
-def _parts(rows: Array) -> Iterator[slice]:
-    """The rows (n, 3) in parts, so that what is computed of each takes little memory."""
-    return (slice(start, start + VERTICES_AT_ONCE) for start in range(0, len(rows), VERTICES_AT_ONCE))
-
-
-def _are_within(reach: float, at: Array, co: Array) -> NDArray[np.bool_]:
-    """Which (n,) of the places (n, 3) are within `reach` of the place `at`."""
-    found = np.empty(len(co), dtype=bool)
-    for part in _parts(co):
-        local = co[part] - at
-        found[part] = np.einsum("ij,ij->i", local, local) <= reach**2
-    return found

@@ -250,9 +250,9 @@ def _verification_report(
     surface: MeshSurface | None, result: core.Reconstruction, most: int | None
 ) -> TouchReport:
     """The report of distances from the patch to the vertices over it that a finger can reach, if any."""
-    geometry, near = result.geometry, surface.vertices_near(result.frame.origin, 2.0 * result.radius, most)
-    over = (vertices[core.reachable(geometry, surface, vertices)] for vertices in near)
-    misses = np.concatenate([core.distances(geometry, result.frame.to_local(some)) for some in over])
+    vertices = surface.vertices_near(result.frame.origin, 2.0 * result.radius, most)
+    over = vertices[core.reachable(result.geometry, surface, vertices)]
+    misses = core.distances(result.geometry, result.frame.to_local(over))
     if not len(misses):
         return {"vertices": 0}
     return {

@@ -1,118 +1,59 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The report of a touch: a dict of plain values, including its message."""
+"""The report of a touch: a dict of plain values, including its message.
+
+The values are such as JSON can hold, or ID properties of a patch object. Lengths are in units of the world,
+curvatures in their inverse, angles in degrees; a `_std` is a standard deviation. Keys are there once they
+are known:
+
+after every fit
+  status, message, doubts : see core.Reconstruction and core.Doubt.to_dict, the gravest first; the status is
+      "outdated" if the patch is from an earlier touch
+  ended : a sentence on what has ended the curves, which is part of the message
+  is_verified : whether the keys are there that take long
+  frame : the Darboux frame in the world: origin, d1, d2 and normal, three numbers each
+  k1, k2, gaussian_curvature, mean_curvature, each with its `_std`; shape_index, curvedness
+  residual : the amplitude of the process that is added to the polynomial
+  coefficients, radius : those of equation (1)
+  contacts, fit_error : their number, and equation (6)
+  height_std : the mean over the domain
+  blind : the number of ways to bend that the planes cannot show
+  source : the name of the object that was touched, or of the file of the contacts
+  method, degree, seconds (by step)
+  axes : (3, 3), see core.SamplingPlane.axes
+after a touch
+  object_size : the longest edge of the bounding box
+  extent, step, noise, seed
+  planes : the azimuth and the tilt of each
+  added_planes : azimuth, height_std_before and height_std of each plane that the touch has added
+  stops : why each curve ended, at its start and at its end
+  height_error : the mean distance in height from the mesh, over the domain
+after a fit to measured contacts
+  unit, curves, strokes, given_contacts
+  misses : how far the curves miss their common point
+once a gesture has ended
+  height_std_rim : the largest one on the boundary of the domain
+  area, total_absolute_curvature, condition_number
+  vertices, vertex_distance_mean, vertex_distance_max : of the mesh, over the patch
+  suggested_plane : azimuth, tangent in the world, and expected_height_std with it
+  patch : the name of the patch object
+  color_limit : where the colors end
+after registration and verification
+  registration : target, pose from 1 on, residuals and nearest vertices of all poses, is_ambiguous
+  verification : the name of the mesh as `target`, and what core.verify has found
+"""
 
 import math
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any, TypedDict
+from typing import Any, TypeAlias
 
 from ... import core
 from .types import Array
 
 RIM_POINTS = 48  # The deviation of the height is looked at in this many places of the boundary.
 AT_POINT = 1e-6  # A half curve that is shorter than this share of the radius ends at the point.
-
-
-class FrameReport(TypedDict):
-    """The Darboux frame of a patch in the world: three numbers each."""
-
-    origin: list[float]
-    d1: list[float]
-    d2: list[float]
-    normal: list[float]
-
-
-class SuggestedPlane(TypedDict, total=False):
-    """A plane: its azimuth in degrees, its tangent in the world, and the height's deviation with it."""
-
-    azimuth: float
-    tangent: list[float]
-    expected_height_std: float
-
-
-class AddedPlane(TypedDict):
-    """A plane that a touch has added: its azimuth in degrees, and the height's deviation before and after."""
-
-    azimuth: float
-    height_std_before: float
-    height_std: float
-
-
-class Registration(TypedDict):
-    """Where on a mesh a patch was put: the pose, from 1 on; residuals and nearest vertices of all poses."""
-
-    target: str
-    pose: int
-    residuals: list[float]
-    vertices: list[int]
-    is_ambiguous: bool
-
-
-class TouchReport(TypedDict, total=False):
-    """What is known of a patch, as plain values that JSON can hold, or as ID properties of its object.
-
-    Lengths are in units of the world, curvatures in their inverse; a `_std` is a standard deviation. Keys
-    are there once they are known: those up to `blind` after every fit, the next ones after a touch or after
-    a fit to measured contacts, the others once a gesture has ended.
-    """
-
-    status: str  # See core.Reconstruction.status; "outdated" if the patch is from an earlier touch.
-    message: str
-    doubts: list[dict[str, Any]]  # See core.Doubt.to_dict; the gravest first.
-    ended: str  # A sentence on what has ended the curves, which is part of the message.
-    is_verified: bool  # Whether the keys are there that take long.
-    frame: FrameReport
-    k1: float
-    k2: float
-    gaussian_curvature: float
-    mean_curvature: float
-    k1_std: float
-    k2_std: float
-    gaussian_curvature_std: float
-    mean_curvature_std: float
-    shape_index: float
-    curvedness: float
-    residual: float  # The amplitude of the process that is added to the polynomial.
-    coefficients: list[float]  # Those of equation (1).
-    radius: float
-    contacts: int
-    fit_error: float  # Equation (6).
-    height_std: float  # The mean over the domain.
-    blind: int  # The number of ways to bend that the planes cannot show.
-
-    source: str  # The name of the object that was touched, or of the file of the contacts.
-    method: str
-    degree: int
-    axes: list[list[float]]  # (3, 3), see core.SamplingPlane.axes.
-    seconds: dict[str, float]
-    object_size: float  # The longest edge of the bounding box.
-    extent: float
-    step: float
-    noise: float
-    seed: int
-    planes: list[list[float]]  # The azimuth and the tilt of each, in degrees.
-    added_planes: list[AddedPlane]
-    stops: list[list[str]]  # Why each curve ended, at its start and at its end.
-    unit: str  # This and the next four are of measured contacts.
-    curves: int
-    strokes: int
-    given_contacts: int
-    misses: list[float]  # How far the curves miss their common point.
-
-    height_std_rim: float  # The largest one on the boundary of the domain.
-    area: float
-    total_absolute_curvature: float
-    condition_number: float
-    height_error: float  # The mean distance in height from the mesh, over the domain.
-    vertices: int  # Of the mesh, over the patch.
-    vertex_distance_mean: float
-    vertex_distance_max: float
-    suggested_plane: SuggestedPlane
-    patch: str  # The name of the patch object.
-    color_limit: float  # Where the colors end.
-    registration: Registration
-    verification: dict[str, Any]  # The name of the mesh as `target`, and what core.verify has found.
+TouchReport: TypeAlias = dict[str, Any]  # The module's docstring has its keys.
 
 
 def ends(contours: Sequence[core.Contour], has_extent: bool) -> str:
@@ -152,7 +93,7 @@ def verdict_report(doubts: Sequence[core.Doubt], message: str) -> TouchReport:
     }
 
 
-def suggestion_report(result: core.Reconstruction, reference: Array) -> SuggestedPlane:
+def suggestion_report(result: core.Reconstruction, reference: Array) -> dict[str, Any]:
     """The plane that would lower the mean deviation most, its azimuth as of planes, and that deviation."""
     e1, outward = reference[:, 0], reference[:, 1]
     plane, expected = core.suggest_plane(result, outward, e1)

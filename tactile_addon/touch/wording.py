@@ -11,7 +11,7 @@ import numpy as np
 from ... import core
 from ...core.arguments import many
 from .settings import METHODS
-from .touch_report import Registration, SuggestedPlane, TouchReport
+from .touch_report import TouchReport
 from .units import Unit, known, length, rounded, say, unit_of_report
 
 SPREAD = ("mean", "median", "max", "rms")
@@ -33,12 +33,15 @@ def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
         ("point", f"{vector(np.divide(report['frame']['origin'], unit[1]))} {unit[0]}".rstrip()),
         ("normal", vector(report["frame"]["normal"])),
         ("first principal direction", vector(report["frame"]["d1"])),
-        ("principal curvatures", ", ".join(_measured(report, key, -1, unit) for key in ("k1", "k2"))),
-        ("Gaussian curvature", _measured(report, "gaussian_curvature", -2, unit)),
-        ("mean curvature", _measured(report, "mean_curvature", -1, unit)),
+        ("principal curvatures", ", ".join(measured(report, key, -1, unit) for key in ("k1", "k2"))),
+        ("Gaussian curvature", measured(report, "gaussian_curvature", -2, unit)),
+        ("mean curvature", measured(report, "mean_curvature", -1, unit)),
         ("shape index", "none, it is flat" if is_flat(report) else f"{report['shape_index']:.3f}"),
-        ("curvedness", say(rounded(report["curvedness"], -1, report["radius"]), -1, unit)),
-        ("texture beside the polynomial", _amplitude(report, unit)),
+        ("curvedness", said(report, "curvedness", -1, unit)),
+        (
+            "texture beside the polynomial",
+            _shared(report, "residual", unit) if report["residual"] else "none",
+        ),
         ("contacts off the patch, mean", _shared(report, "fit_error", unit)),
         ("standard deviation of the height", _shared(report, "height_std", unit)),
         ("mesh to patch", _verification(report, unit)),
@@ -173,7 +176,7 @@ def _verified_rows(report: TouchReport, unit: Unit) -> list[tuple[str, str]]:
     ]
 
 
-def registration_summary(found: Registration, unit: Unit | None = None) -> str:
+def registration_summary(found: Mapping[str, Any], unit: Unit | None = None) -> str:
     """A sentence on where a patch was put by registration, in this unit or in that of the residual."""
     residual = found["residuals"][found["pose"] - 1]
     words = f'The contacts are {length(residual, unit)} off "{found["target"]}" (root mean square)'
@@ -188,7 +191,7 @@ def _spread(report: TouchReport, what: str, unit: Unit) -> str:
     return ", ".join(f"{key} {_length(found[f'{what}_{key}'], report, unit)}" for key in SPREAD)
 
 
-def _suggestion(plane: SuggestedPlane, unit: Unit) -> str:
+def _suggestion(plane: Mapping[str, Any], unit: Unit) -> str:
     return (
         f"azimuth {plane['azimuth']:.0f} degrees, along {vector(plane['tangent'])}; "
         f"would take the standard deviation of the height to {say(plane['expected_height_std'], 1, unit)}"
@@ -202,20 +205,20 @@ def vector(v: Iterable[float]) -> str:
     return " ".join(f"{x if abs(x) > rounding else 0.0:.5g}" for x in components)
 
 
-def _measured(report: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
+def measured(report: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
     """A value of the report, which is in length^power, in words with its standard deviation."""
     return say(rounded(report[key], power, report["radius"]), power, unit, report[f"{key}_std"])
 
 
-def _amplitude(report: TouchReport, unit: Unit) -> str:
-    """The deviation of the process that is added to the polynomial, in words."""
-    return _shared(report, "residual", unit) if report["residual"] else "none"
+def said(report: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
+    """A value of the report, which is in length^power, in words."""
+    return say(rounded(report[key], power, report["radius"]), power, unit)
 
 
 def _shared(report: Mapping[str, Any], key: str, unit: Unit) -> str:
     """A length of the report in words, with its share of the radius."""
     share = 100.0 * report[key] / report["radius"]
-    return f"{_length(report[key], report, unit)}, {share:.2f} % of the radius"
+    return f"{said(report, key, 1, unit)}, {share:.2f} % of the radius"
 
 
 def _length(value: float, report: Mapping[str, Any], unit: Unit) -> str:

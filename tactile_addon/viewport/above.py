@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Solid shading: maps and incomplete surfaces above their mesh, and patches above each other and surfaces.
 
-Where two objects are in one place, either would show here and there. So they are drawn once more, moved along
-normals or toward the viewer. Material Preview and Rendered move them by their material. Nothing is moved that
-an export has.
+Where two objects are in one place, either would show here and there. So they are drawn once more: moved along
+normals, or one after the other, the nearest last. Material Preview and Rendered move them by their material.
+Nothing is moved that an export has.
 """
 
 from collections.abc import Sequence
@@ -14,25 +14,19 @@ from typing import Any, cast
 import bpy
 import gpu
 import numpy as np
+from gpu_extras.batch import batch_for_shader
 
 from ..scene.mesh_data import ABOVE
-from ..scene.patch_record import ATLAS_RECORD, MAP_RECORD, report_of
+from ..scene.patch_record import RECORD, report_of, touched_record
 from ..touch.arrays import read_array
 from ..touch.types import Array, Object
 
 DARKEST, BRIGHTEST = 0.3, 0.7  # The share of its color that a face has edge on, and upright, as in Solid.
-TOWARD = 0.015  # A patch is drawn nearer by this share of its distance than what is below it.
-ALIKE = 0.1  # Patches overlap only if the cosine between their normals is more.
-# The place on the screen stays, and only the depth is that of a nearer point.
 VERTEX = """
 void main() {
-  vec4 seen = ModelViewMatrix * vec4(pos, 1.0);
   facing = abs(normalize(mat3(ModelViewMatrix) * normal).z);
   tint = color;
-  gl_Position = ProjectionMatrix * seen;
-  vec4 nearer = ProjectionMatrix * vec4(seen.xyz + (ProjectionMatrix[3][3] == 0.0 ? -seen.xyz * toward
-                                                    : vec3(0.0, 0.0, toward * size)), 1.0);
-  gl_Position.z = nearer.z / nearer.w * gl_Position.w;
+  gl_Position = ProjectionMatrix * ModelViewMatrix * vec4(pos, 1.0);
 }
 """
 FRAGMENT = f"void main() {{ shown = vec4(tint.rgb * mix({DARKEST}, {BRIGHTEST}, facing), 1.0); }}"
@@ -48,51 +42,31 @@ def draw_above() -> None:
         return
     objects: Sequence[Object] = list(context.visible_objects)
     visible = {obj for obj in objects if obj.type == "MESH" and obj.data.color_attributes.active_color}
-    in_mesh = [obj for obj in visible if _is_of_object(obj) and not obj.show_in_front]
-    layers = _layers([obj for obj in visible if obj.show_in_front])
-    for uid in set(_batches) - {obj.session_uid for obj in (*in_mesh, *layers)}:
+    in_mesh = [obj for obj in visible if touched_record(obj) and not obj.show_in_front]
+    in_front = [obj for obj in visible if obj.show_in_front and (touched_record(obj) or report_of(obj))]
+    for uid in set(_batches) - {obj.session_uid for obj in (*in_mesh, *in_front)}:
         del _batches[uid]
     gpu.state.depth_test_set("LESS_EQUAL")
     gpu.state.depth_mask_set(True)
     for obj in in_mesh:
-        _draw(obj, obj.get(ABOVE, 0.0), 0)
-    if any(layers.values()):
-        gpu.state.active_framebuffer_get().clear(depth=1.0)  # They are drawn in front of all others.
-        for obj, layer in layers.items():
-            _draw(obj, 0.0, layer)
+        _draw(obj, obj.get(ABOVE, 0.0))
+    if len(in_front) > 1:
+        view: Any = context.region_data.view_matrix
+        in_front.sort(key=lambda obj: (RECORD in obj, (view @ obj.matrix_world.translation).z))
+        for obj in in_front:
+            gpu.state.active_framebuffer_get().clear(depth=1.0)  # It is drawn in front of all before it.
+            _draw(obj, 0.0)
     gpu.state.depth_mask_set(False)
     gpu.state.depth_test_set("NONE")
 
 
-def _is_of_object(obj: Object) -> bool:
-    """Whether an object is the surface or the map of a whole object."""
-    return ATLAS_RECORD in obj or MAP_RECORD in obj
-
-
-def _layers(objects: list[Object]) -> dict[Object, int]:
-    """The layers of surfaces, which are 0, and of patches, which are above what they overlap."""
-    layers = {obj: 0 for obj in objects if _is_of_object(obj)}
-    first, placed = int(bool(layers)), np.zeros((0, 8))
-    patches = {obj: report for obj in objects if (report := report_of(obj)) is not None}
-    for obj in sorted(patches, key=lambda each: each.session_uid):
-        matrix, radius = np.array(obj.matrix_world), patches[obj]["radius"]
-        place, normal = matrix[:3, 3], matrix[:3, 2]
-        near = np.linalg.norm(placed[:, :3] - place, axis=1) < placed[:, 6] + radius
-        taken = placed[near & (placed[:, 3:6] @ normal > ALIKE), 7]
-        layers[obj] = next(n for n in range(first, len(taken) + first + 1) if n not in taken)
-        placed = np.vstack([placed, [*place, *normal, radius, layers[obj]]])
-    return layers
-
-
-def _draw(obj: Object, height: float, layer: int) -> None:
-    """Draws an object this far along its normals, and by so many layers toward the viewer."""
+def _draw(obj: Object, height: float) -> None:
+    """Draws an object this far along its normals."""
     shader, pushed = _shader(), cast(Any, gpu.matrix.push_pop())  # which the stubs make no context
     with pushed:
         gpu.matrix.multiply_matrix(obj.matrix_world)
         shader.uniform_float("ModelViewMatrix", gpu.matrix.get_model_view_matrix())
         shader.uniform_float("ProjectionMatrix", gpu.matrix.get_projection_matrix())
-        shader.uniform_float("toward", TOWARD * layer)
-        shader.uniform_float("size", max(obj.dimensions))
         _batch(obj, height).draw(shader)
 
 
@@ -118,14 +92,8 @@ def _new_batch(mesh: bpy.types.Mesh, points: Array, colors: Array, height: float
     normals = read_array(mesh.vertices, "normal", 3)
     points = points + height * normals
     facing = read_array(mesh.corner_normals, "vector", 3)
-    form = gpu.types.GPUVertFormat()
-    columns = {"pos": points[corners], "normal": facing[loops], "color": colors[loops]}
-    for name, values in columns.items():
-        form.attr_add(id=name, comp_type="F32", len=values.shape[1], fetch_mode="FLOAT")
-    buffer: Any = gpu.types.GPUVertBuf(form, len(loops))  # which takes arrays, though the stubs have none
-    for name, values in columns.items():
-        buffer.attr_fill(id=name, data=np.ascontiguousarray(values, dtype=np.float32))
-    return gpu.types.GPUBatch(type="TRIS", buf=buffer)
+    columns: dict[str, Any] = {"pos": points[corners], "normal": facing[loops], "color": colors[loops]}
+    return batch_for_shader(_shader(), "TRIS", columns)
 
 
 @lru_cache(maxsize=1)
@@ -135,13 +103,8 @@ def _shader() -> Any:
     passed = gpu.types.GPUStageInterfaceInfo("above")
     passed.smooth("FLOAT", "facing")
     passed.smooth("VEC4", "tint")
-    for kind, name in (
-        ("MAT4", "ProjectionMatrix"),
-        ("MAT4", "ModelViewMatrix"),
-        ("FLOAT", "toward"),
-        ("FLOAT", "size"),
-    ):
-        info.push_constant(kind, name)
+    info.push_constant("MAT4", "ProjectionMatrix")
+    info.push_constant("MAT4", "ModelViewMatrix")
     for place, (kind, name) in enumerate((("VEC3", "pos"), ("VEC3", "normal"), ("VEC4", "color"))):
         info.vertex_in(place, kind, name)
     info.vertex_out(passed)

@@ -18,7 +18,7 @@ from mathutils import Matrix, Vector
 from ... import core
 from ..scene.curves import CURVES, Curves, curves_of
 from ..scene.mesh_data import ABOVE
-from ..touch.types import Array, Object
+from ..touch.types import Object
 
 # Each sampling plane has one of Okabe and Ito's colors, which color-blind readers can tell apart.
 PLANE_COLORS = [
@@ -77,8 +77,10 @@ def draw(curves: Curves, rim: tuple[float, ...], has_contours: bool, has_directi
     if has_directions:
         lines += [(path, BLACK) for path in curves["directions"]]
     _draw_lines([(np.asarray(path, dtype=float).tobytes(), color) for path, color in lines])
+    gpu.state.point_size_set(STROKE * scale)
     for path in curves.get("strokes", ()) if has_contours else ():
-        _draw_points(np.reshape(path, (-1, 3)), STROKE * scale)
+        points = np.reshape(path, (-1, 3)).tolist()
+        draw_shape("POINTS", "POINT_UNIFORM_COLOR", {"pos": points}, color=BLACK)
 
 
 def _draw_lines(lines: Sequence[tuple[bytes, tuple[float, ...]]]) -> None:
@@ -106,11 +108,14 @@ def _batch(lines: tuple[tuple[bytes, tuple[float, ...]], ...], is_outline: bool)
     return batch_for_shader(_shader(), "LINES", columns)
 
 
-def _draw_points(points: Array, size: float) -> None:
-    shader = gpu.shader.from_builtin("POINT_UNIFORM_COLOR")
-    shader.uniform_float("color", BLACK)
-    gpu.state.point_size_set(size)
-    batch_for_shader(shader, "POINTS", {"pos": points.tolist()}).draw(shader)
+def draw_shape(kind: Any, shader_name: str, columns: dict[str, Any], **uniform: Any) -> None:
+    """Draws points or triangles, as `kind` has it, with one of Blender's own shaders."""
+    shader = gpu.shader.from_builtin(shader_name)
+    gpu.state.blend_set("ALPHA")
+    for key, value in uniform.items():
+        shader.uniform_float(key, value)
+    batch_for_shader(shader, kind, columns).draw(shader)
+    gpu.state.blend_set("NONE")
 
 
 def draw_letters() -> None:

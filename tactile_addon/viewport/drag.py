@@ -127,15 +127,11 @@ class TACTILE_OT_drag(bpy.types.Operator):
             hit = surface.ray_cast(origin.to_tuple(), direction.to_tuple(), 4.0 * space.clip_end)
             if hit is None:
                 return
-            upright, normal = self._matrix.col[2].xyz.normalized(), Vector(hit[1])
-            if upright.dot(direction) < 0.0:  # Seen from its side, it faces the eye.
-                is_turned = normal.dot(direction) > 0.0
-            else:  # Seen from behind, it stays inside or outside the mesh.
-                _, outward, _ = surface.project(self._matrix.translation.to_tuple())
-                is_turned = upright.dot(outward) < 0.0
+            _, outward, _ = surface.project(self._matrix.translation.to_tuple())
         except (ValueError, AttributeError):  # The target is gone or cannot be touched; the panel says so.
             return
-        if is_turned:
+        upright, normal = self._matrix.col[2].xyz.normalized(), Vector(hit[1])
+        if upright.dot(outward) < 0.0:  # It stays inside or outside the mesh.
             normal.negate()
         turn = upright.rotation_difference(normal) @ self._matrix.to_quaternion()
         self._set(context, Matrix.LocRotScale(list(hit[0]), turn, self._matrix.to_scale()))

@@ -8,9 +8,7 @@ from typing import Any
 
 import blf
 import bpy
-import gpu
 import numpy as np
-from gpu_extras.batch import batch_for_shader
 
 from ..probes import probe
 from ..scene import colors, patch_record
@@ -22,7 +20,7 @@ from ..touch.touch_object import plane_axes
 from ..touch.types import Object
 from ..touch.units import Unit
 from .above import draw_above
-from .curves import FONT, PLANE_COLORS, WHITE, draw_curves, draw_letters, draw_preview
+from .curves import FONT, PLANE_COLORS, WHITE, draw_curves, draw_letters, draw_preview, draw_shape
 from .drag import DRAG_TILT, DRAG_TURN
 from .free_view import free_strip
 from .mouse import is_over
@@ -44,21 +42,8 @@ def draw_key(seen: dict[str, Any]) -> None:
         planes = [(f"Curve in Plane {number}", (*color, 1.0)) for number, color in enumerate(shown, 1)]
         _draw_box(context, "Preview", 0.0, [], [("Rim and Normal of the Patch", WHITE), *planes])
     elif seen["refusal"] is not None:
-        _draw_words(context, textwrap.wrap(seen["refusal"], LETTERS), seen["mouse"])
-
-
-def _draw_words(context: bpy.types.Context, lines: Sequence[str], mouse: Sequence[float]) -> None:
-    """Draws lines of text in a box next to a place of the window, in the region that has it."""
-    region, (scale, gap, line, ground) = context.region, _begin_box(context)
-    x, y = mouse[0] - region.x, mouse[1] - region.y
-    wide = max(blf.dimensions(FONT, text)[0] for text in lines) + 2.0 * gap
-    high = len(lines) * (line + gap) + gap
-    left, right, bottom = free_strip(context, high, BESIDE * scale)
-    x = max(min(x + OFFSET * scale, right - gap - wide), left)
-    y = min(max(y - OFFSET * scale - high, bottom), region.height - high)
-    _fill_box(x, y, wide, high, (*ground, 0.9))
-    for number, text in enumerate(lines):
-        _write(text, x + gap, y + high - (number + 1) * (line + gap))
+        title, *lines = textwrap.wrap(seen["refusal"], LETTERS)
+        _draw_box(context, title, 0.0, [], [(line, None) for line in lines], seen["mouse"])
 
 
 def _begin_box(context: bpy.types.Context) -> tuple[float, float, float, Sequence[float]]:
@@ -95,13 +80,9 @@ def draw_plane() -> None:
     number = min(settings.active_plane, settings.plane_count - 1)
     t, up, _ = plane_axes(obj.matrix_world, settings, number).T
     origin, size = np.array(obj.matrix_world.translation, dtype=float), record["extent"]
-    corners = [origin + size * (a * t + b * up) for a, b in ((-1, -0.6), (1, -0.6), (1, 0.6), (-1, 0.6))]
-    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    gpu.state.blend_set("ALPHA")
-    shader.uniform_float("color", (*PLANE_COLORS[number], 0.18))
-    positions: dict[str, Any] = {"pos": [corner.tolist() for corner in corners]}
-    batch_for_shader(shader, "TRIS", positions, indices=[(0, 1, 2), (0, 2, 3)]).draw(shader)
-    gpu.state.blend_set("NONE")
+    corners = [origin + size * (a * t + b * up) for a, b in ((-1, -0.6), (1, -0.6), (-1, 0.6), (1, 0.6))]
+    strip = {"pos": np.array(corners).tolist()}
+    draw_shape("TRI_STRIP", "UNIFORM_COLOR", strip, color=(*PLANE_COLORS[number], 0.18))
 
 
 def draw_legend() -> None:
@@ -162,25 +143,34 @@ def _draw_box(
     title: str,
     low: float,
     labels: Sequence[tuple[float, str]],
-    swatches: Sequence[tuple[str, Sequence[float]]] = (),
+    swatches: Sequence[tuple[str, Sequence[float] | None]] = (),
+    mouse: Sequence[float] | None = None,
 ) -> None:
-    """Draws a title, a bar of colors from `low` to 1 if there are labels, and swatches, if there is room."""
-    scale, gap, line, ground = _begin_box(context)
+    """Draws a title, a bar of colors from `low` to 1 if there are labels, and lines, if there is room.
+
+    swatches : lines of text, each with the color of a swatch before it or None
+    mouse : the box is next to this place of the window, or else in the lower right corner
+    """
+    region, (scale, gap, line, ground) = context.region, _begin_box(context)
     bar = BAR[1] * scale + line + 2.0 * gap if labels else 0.0
     high = line + 2.0 * gap + bar + len(swatches) * (line + gap)
     left, right, bottom = free_strip(context, high + gap, BESIDE * scale)
     lengths = [blf.dimensions(FONT, title)[0]]
     lengths += [blf.dimensions(FONT, text)[0] + 2.0 * line + gap for text, _ in swatches]
     wide = min(max(BAR[0] * scale, *lengths) + 4.0 * gap, right - left - gap)
-    if wide < 0.5 * BAR[0] * scale or bottom + high > context.region.height:
+    if wide < 0.5 * BAR[0] * scale or bottom + high > region.height:
         return
     x, y = right - gap - wide, bottom + gap
+    if mouse is not None:
+        x = max(min(mouse[0] - region.x + OFFSET * scale, x), left)
+        y = min(max(mouse[1] - region.y - OFFSET * scale - high, y), region.height - high)
     _fill_box(x, y, wide, high, (*ground, 0.8))
     x, wide = x + 2.0 * gap, wide - 4.0 * gap
     for number, (text, color) in enumerate(reversed(swatches)):
         at = y + gap + number * (line + gap)
-        _fill_box(x, at, 2.0 * line, line, color)
-        _write(text, x + 2.0 * line + gap, at)
+        if color is not None:
+            _fill_box(x, at, 2.0 * line, line, color)
+        _write(text, x if color is None else x + 2.0 * line + gap, at)
     y += high - gap - line
     if labels:
         _draw_bar(x, y - gap - BAR[1] * scale, wide, BAR[1] * scale, gap, low, labels)
@@ -194,7 +184,8 @@ def _draw_bar(
     """Draws the colors from `low` to 1, and the (share, text) labels below them."""
     at = np.linspace(x, x + wide, LEGEND_STEPS)
     shades = colors.shades(np.repeat(np.linspace(low, 1.0, LEGEND_STEPS), 2), 1.0)
-    _fill([(a, b) for a in at for b in (y, y + high)], shades.tolist())
+    points = [(a, b) for a in at for b in (y, y + high)]
+    draw_shape("TRI_STRIP", "SMOOTH_COLOR", {"pos": points, "color": shades.tolist()})
     labels = [(share, text.replace("-", "\N{MINUS SIGN}")) for share, text in labels]
     first, middle, last = (blf.dimensions(FONT, text)[0] for _, text in labels)
     if 0.5 * (wide - middle) < max(first, last):
@@ -207,20 +198,13 @@ def _draw_bar(
 
 
 def _fill_box(x: float, y: float, wide: float, high: float, color: Sequence[float]) -> None:
-    _fill([(x, y), (x + wide, y), (x, y + high), (x + wide, y + high)], [color] * 4)
+    corners = {"pos": [(x, y), (x + wide, y), (x, y + high), (x + wide, y + high)]}
+    draw_shape("TRI_STRIP", "UNIFORM_COLOR", corners, color=color)
 
 
 def _write(text: str, x: float, y: float) -> None:
     blf.position(FONT, x, y, 0.0)
     blf.draw(FONT, text)
-
-
-def _fill(points: Sequence[Sequence[float]], shades: Sequence[Sequence[float]]) -> None:
-    """Draws a strip of triangles, each point (x, y) of which has a color of its own."""
-    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
-    gpu.state.blend_set("ALPHA")
-    batch_for_shader(shader, "TRI_STRIP", {"pos": points, "color": shades}).draw(shader)
-    gpu.state.blend_set("NONE")
 
 
 # Functions that draw and when they do so: those that are always there, and those of a pick. The latter get a

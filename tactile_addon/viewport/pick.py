@@ -33,8 +33,7 @@ from ..touch.touch_object import Touched, touch
 from ..touch.types import Object, Outcome
 from ..touch.wording import curvatures, sentence, verdict
 from . import overlay
-from .below import large_meshes, names_below, point_below, read
-from .mouse import draw_hints
+from .mouse import draw_hints, large_meshes, point_below
 
 NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NDOF", "NUMPAD", "MOUSEROTATE", "MOUSESMARTZOOM", "HOME")
 HINTS = (
@@ -78,20 +77,20 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         active = context.view_layer.objects.active
         if active is not None and active.type == "MESH":
             show_size(max(active.dimensions[:]))
-        self._area, self._unread = context.area, large_meshes(context)
+        self._area, self._large = context.area, large_meshes(context)
         for name in NAMES:  # Blender remembers those of the last pick, which suited another object.
             self.properties.property_unset(name)
         try:
             self._inherit(context)
         except ValueError as error:
             return report_error(self, error)
-        if self.at_once:
-            return self._click(context, event)
         # The drawing may outlive this operator by a redraw, so it gets a dict and not the operator.
         self._seen: dict[str, Any] = {}
         self._drawings = overlay.add_drawings(overlay.PICK_DRAWINGS, self._seen)
         context.window.cursor_modal_set("EYEDROPPER")
         context.workspace.status_text_set(lambda header, _: draw_hints(header.layout, HINTS))
+        if self.at_once:
+            return self._press(context, event)
         context.window_manager.modal_handler_add(self)
         self._hover(context, event)
         return {"RUNNING_MODAL"}
@@ -105,26 +104,20 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         if event.type == "MOUSEMOVE":
             self._hover(context, event)
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
-            words = self._hover(context, event)
-            if self._seen["touched"] is not None:
-                self.cancel(context)
-                return self._take(context)
-            self._seen["refusal"] = words
+            return self._press(context, event)
         return {"RUNNING_MODAL"}
 
-    def _click(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
-        """Touches below the mouse at once, as the tool in the toolbar does."""
-        self._seen = {"touched": None}
+    def _press(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
+        """Makes the probe below the mouse; where no touch is possible, a pick goes on and the tool ends."""
         words = self._hover(context, event)
-        self._area.header_text_set(None)
-        context.window.cursor_modal_restore()
-        if self._seen["touched"] is None:
+        touched = self._seen["touched"]
+        if touched is None and not self.at_once:
+            self._seen["refusal"] = words
+            return {"RUNNING_MODAL"}
+        self.cancel(context)
+        if touched is None:
             self.report({"WARNING"}, words)
             return {"CANCELLED"}
-        return self._take(context)
-
-    def _take(self, context: bpy.types.Context) -> Outcome:
-        touched = self._seen["touched"]
         self.target, self.location = touched.report["source"], touched.result.point
         self.outward = touched.result.frame.axes[:, 2]
         return self._make(context, touched)
@@ -207,9 +200,10 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         The header has no room for a sentence, so a refusal is drawn next to the mouse.
         """
         words = short = "Move over a mesh to touch it"
+        if self._large:  # Blender builds trees of their faces then.
+            short += f" (the first touch of {', '.join(sorted(self._large))} takes a while)"
         self._seen |= {"touched": None, "refusal": None, "mouse": (event.mouse_x, event.mouse_y)}
         try:
-            self._read(context, names_below(context, event, self._unread))
             found = point_below(context, event)
             if found is not None:
                 obj, location, eye = found
@@ -230,19 +224,37 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         _redraw(context)
         return words
 
-    def _read(self, context: bpy.types.Context, names: list[str]) -> None:
-        """Prepares large meshes for their first touch, and says so, because it takes a while."""
-        if not names:
-            return
-        self._unread.difference_update(names)
-        self._area.header_text_set(f"Pick Reference Point     Reading {', '.join(names)} for the first touch")
-        context.window.cursor_modal_set("WAIT")
-        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
-        read(context, names)
-        context.window.cursor_modal_set("EYEDROPPER")
-
 
 def _redraw(context: bpy.types.Context) -> None:
     for area in context.screen.areas:
         if area.type == "VIEW_3D":
             area.tag_redraw()
+
+
+class TactileTool(bpy.types.WorkSpaceTool):
+    bl_space_type, bl_context_mode = "VIEW_3D", "OBJECT"
+    bl_idname = "tactile.tool"
+    bl_label = "Tactile Probe"
+    bl_description = "Click on a mesh to place a probe there or to move the active probe there"
+    bl_icon = "ops.paint.eyedropper_add"
+    bl_keymap = (
+        (
+            TACTILE_OT_pick.bl_idname,
+            {"type": "LEFTMOUSE", "value": "PRESS"},
+            {"properties": [("at_once", True)]},
+        ),
+    )
+
+
+def register_tool() -> None:
+    """Adds the tool to the toolbar."""
+    bpy.utils.register_tool(TactileTool, after={"builtin.measure"})
+
+
+def unregister_tool() -> None:
+    """Takes the tool out of the toolbar."""
+    bpy.utils.unregister_tool(TactileTool)
+    # Blender itself leaves the tool's keys among the user's keys.
+    user = bpy.context.window_manager.keyconfigs.user
+    for keymap in [keymap for keymap in user.keymaps if keymap.name.endswith(f", {TactileTool.bl_label}")]:
+        user.keymaps.remove(keymap)

@@ -60,7 +60,6 @@ def test_what_cannot_run_says_why(empty):
     assert refused("pick") == said
     on_probes = ("add_plane", "add_planes", "remove_plane", "update", "delete")
     assert {refused(name) for name in on_probes} == {"Select a probe, or pick a reference point first"}
-    assert refused("show_colors") == "Use it in a 3D viewport"
     for name in ("verify", "register", "export_contacts", "export_patch"):
         assert refused(name).startswith("Select a ")
     empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32)
@@ -122,3 +121,11 @@ def test_the_tab_is_where_the_preferences_have_it(extension, empty):
     preferences.tab = ""
     assert tabs() == {"Tactile"}
     preferences.tab = "Tactile"
+
+
+def test_each_operator_that_a_panel_or_a_menu_names_is_registered(extension, empty):
+    folder = Path(extension.tactile_addon.__file__).parent
+    sources = [path.read_text(encoding="utf-8") for path in folder.rglob("*.py")]
+    names = {name for source in sources for name in re.findall(r'"tactile\.(\w+)"', source)}
+    assert {"pick", "delete", "touch_all_over"} <= names
+    assert names <= {*dir(empty.ops.tactile), "tool"}  # The last is a tool.

@@ -114,23 +114,6 @@ def test_at_the_end_of_a_gesture_the_patch_is_that_of_a_fresh_touch(empty, ridge
     assert dragged == fresh
 
 
-def test_a_number_of_an_array_that_is_set_is_answered_once(empty, ridge, gesture, extension, monkeypatch):
-    """Blender calls back twice for it. A value set again is answered if something else has changed."""
-    handlers, looked = extension.tactile_addon.probes.change_handlers, []
-    inner = handlers._look_at
-    monkeypatch.setattr(handlers, "_look_at", lambda *given: looked.append(1) or inner(*given))
-    probe, patch = pick(empty, ridge, -0.6)
-    looked.clear()
-    probe.tactile_probe.azimuths[0] = 0.1
-    assert len(looked) == 1
-    assert report_of(patch)["planes"][0][0] == pytest.approx(math.degrees(0.1))
-    probe.location.x += 0.05
-    empty.context.view_layer.update()
-    looked.clear()
-    probe.tactile_probe.azimuths[0] = 0.1
-    assert looked
-
-
 def test_a_plane_that_comes_while_another_is_turned_is_felt_too(empty, ridge, gesture):
     probe, patch = pick(empty, ridge, -0.6)
     probe.tactile_probe.plane_count = 4

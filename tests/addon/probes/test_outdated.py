@@ -114,7 +114,7 @@ def test_without_a_window_every_frame_has_time_for_a_touch(empty, extension, pro
     assert counting.in_time == [True]  # without a window a touch is always in time
     record_of(probe)["seconds"]["touch"] = 1.0
     assert live._seconds(probe) > live.CHEAP
-    live._look_at(probe, empty.context.evaluated_depsgraph_get(), {}, False)
+    live._look_at(probe, empty.context.evaluated_depsgraph_get(), {}, False, True)
     assert said(probe)[0] == "ok"  # nothing has changed
     empty.context.scene.frame_set(3)
     assert said(probe)[0] == "ok"
@@ -124,9 +124,9 @@ class Counting:
     def __init__(self, function):
         self.function, self.in_time = function, []
 
-    def __call__(self, probe, depsgraph, reshaped, in_time):
+    def __call__(self, probe, depsgraph, reshaped, in_time, complete):
         self.in_time.append(in_time)
-        return self.function(probe, depsgraph, reshaped, in_time)
+        return self.function(probe, depsgraph, reshaped, in_time, complete)
 
 
 @pytest.mark.parametrize("live", [True, False])

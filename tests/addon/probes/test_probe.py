@@ -608,7 +608,6 @@ def test_without_a_probe_there_is_nothing_to_change(empty, ball):
     assert polls() == [True, True, False, True, True]
     empty.context.view_layer.objects.active = None
     assert polls() == [False] * 5
-    assert not empty.ops.tactile.show_colors.poll()  # there is no viewport
 
 
 def test_a_saved_probe_is_as_it_was_and_goes_on(empty, ball, tmp_path):
@@ -854,7 +853,7 @@ def test_disabling_takes_handler_and_properties_away_and_enabling_brings_them_ba
 
 
 def test_an_instance_is_not_touched_for_what_it_shows(empty, ball, extension):
-    touchable = extension.tactile_addon.viewport.below._require_touchable
+    touchable = extension.tactile_addon.viewport.mouse._require_touchable
     touchable(ball, ball.matrix_world.copy())
     with pytest.raises(ValueError, match=f'This is an instance of "{ball.name}": make it real'):
         touchable(ball, Matrix.Translation((5.0, 0.0, 0.0)))

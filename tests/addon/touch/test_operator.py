@@ -645,7 +645,7 @@ def test_vertices_near_a_point_take_little_more_memory_than_themselves(empty, ex
     surface = extension.tactile_addon.touch.surface.MeshSurface(obj, depsgraph)
     tracemalloc.start()
     try:
-        near = np.vstack([*surface.vertices_near((0.2, 0.1, 0.0), 0.1003)])
+        near = surface.vertices_near((0.2, 0.1, 0.0), 0.1003)
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
