@@ -54,7 +54,7 @@ RUNS = {
     "film": Run(f"tools.film --zip {ZIP}", "", {"film.webp": None}),
     "accuracy": Run("benchmarks.accuracy", "Exact surfaces and random shapes"),
     "chart": Run("benchmarks.chart", "", _chart("speed_accuracy")),
-    "real": Run("benchmarks.real --points 100 --chart", "Scans of real objects", _chart("real_surfaces")),
+    "real": Run("benchmarks.real", "Scans of real objects"),
     "curvatures": Run("benchmarks.curvatures", "How often deviations hold"),
     "facets": Run(f"benchmarks.facets {ZIP}", "Facets"),
     "stability": Run("benchmarks.stability", "Limits of the methods", _chart("stability")),
@@ -71,11 +71,7 @@ RUNS = {
     "orientation": Run("benchmarks.measured --orientation", "Sides of strokes without normals"),
     "palpation": Run("benchmarks.robot $PALPATION", "The contacts of a real robot"),
     "live": Run(f"benchmarks.live {ZIP}", "Live updates in Blender"),
-    "paper": Run(
-        f"benchmarks.paper {ZIP}",
-        "The paper's experiments",
-        {"paper_figures_3_4.jpg": "paper/figures_3_4.jpg", "paper_table_1.jpg": "paper/table_1.jpg"},
-    ),
+    "paper": Run(f"benchmarks.paper {ZIP}", "The paper's experiments"),
 }
 # Pictures of a window are taken by tests/gui/run.sh in build/gui, and one picture is drawn by hand.
 WINDOW = ("pick", "probe", "deviation", "verify", "stability", "lost", "found", "whole_object")
