@@ -2,12 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Speed against accuracy: each fit of this project, and what else one could take, on the same contacts.
 
-`python -m benchmarks.chart [--quick | --redraw]`, from the root of a checkout. A peer whose package is
-missing is left out with a message. With --redraw the stored table of docs/charts is drawn again. The command
-writes build/charts/speed_accuracy.png and .csv: milliseconds from contacts to the heights of the hold-out,
-and micrometers by which these are off, for the exact surfaces, plane sets and noise levels of
-benchmarks.accuracy (`--quick` takes one plane set and one seed). The methods take turns, case by case, in one
-process on one thread.
+`python -m benchmarks.chart [--quick]`, from the root of a checkout. A peer whose package is missing is left
+out with a message. The command writes build/charts/speed_accuracy.png and .csv: milliseconds from contacts to
+the heights of the hold-out, and micrometers by which these are off, for the exact surfaces, plane sets and
+noise levels of benchmarks.accuracy (`--quick` takes one plane set and one seed). The methods take turns, case
+by case, in one process on one thread.
 """
 
 import argparse
@@ -381,12 +380,7 @@ def caption_of(methods, quick):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="one plane set and seed")
-    parser.add_argument("--redraw", action="store_true", help="draw the tables of docs/charts again")
     options = parser.parse_args()
-    if options.redraw:
-        caption, *table = plot.stored("speed_accuracy")
-        draw_heights(table, METHODS, caption)
-        return
     methods = available(METHODS)
     results = measured(methods, options.quick)
     draw_heights(rows_of(methods, results), methods, caption_of(methods, options.quick))

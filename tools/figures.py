@@ -59,7 +59,7 @@ RUNS = {
     "facets": Run(f"benchmarks.facets {ZIP}", "Facets"),
     "stability": Run("benchmarks.stability", "Limits of the methods", _chart("stability")),
     "shapes": Run("benchmarks.atlas --shapes --coarsest 0.002", "Made objects, touched all over"),
-    "atlas": Run("benchmarks.atlas --coarsest 0.002", "Scans, touched all over", _chart("atlas")),
+    "atlas": Run("benchmarks.atlas --coarsest 0.002", "Scans, touched all over"),
     "field": Run("benchmarks.field $YCB", "Objects of a public set, touched all over"),
     "add_menu": Run(
         f"benchmarks.add_menu {ZIP}", "Blender's Add menu", {"add_menu.jpg": "charts/add_menu.jpg"}
