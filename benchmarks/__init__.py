@@ -9,6 +9,7 @@ import os
 import platform
 import shutil
 import subprocess
+import sys
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
@@ -22,6 +23,12 @@ NO_SCANS = (
     f"there are no scans in {SCANS_FOLDER}: download the nine that benchmarks/SCANS.md lists into one "
     "folder, and name it by TACTILE_SCANS"
 )
+
+
+def scan_files(words=""):
+    """The files of the scans with `words` in their names, sorted. Ends the command if there are none."""
+    found = sorted(path for path in SCANS_FOLDER.glob("*.*") if words in path.stem)
+    return found or sys.exit(NO_SCANS)
 
 
 def commit():

@@ -26,7 +26,7 @@ import core
 from tests import solids
 from tools import blender
 
-from . import SCANS_FOLDER, machine, table
+from . import machine, scan_files, table
 from .atlas_shapes import print_shapes
 from .real import Scan
 from .whole import EDGE, NOISE, away, contacts_of, tree_of
@@ -40,7 +40,7 @@ class Scanned:
     """A scan, and random points all over it, by area."""
 
     def __init__(self, name):
-        self.scan = Scan(next(SCANS_FOLDER.glob(f"{name}*")))
+        self.scan = Scan(scan_files(name)[0])
         self.name, self.ray_cast = self.scan.name, self.scan.ray_cast
         (self.start, self.outward), *_ = self.scan.places(1, 0)
         places = list(self.scan.places(POINTS, 1))
@@ -147,6 +147,7 @@ def main():
     parser.add_argument("--first", type=int, default=0, help="the first of these starts (%(default)s)")
     parser.add_argument("--places", type=int, default=20_000, help="places around each (%(default)s)")
     options = parser.parse_args()
+    scan_files()  # Without scans it ends now, and not after hours.
     if options.shapes:
         starts = range(options.first, options.first + options.starts)
         print_shapes(options.only, (options.finest, options.coarsest), starts, options.places)

@@ -26,7 +26,7 @@ import core
 from tests import solids
 from tools import blender
 
-from . import SCANS_FOLDER, machine, table
+from . import machine, scan_files, table
 from .real import Scan
 from .whole import EDGE, NOISE, away, contacts_of, poisson, put_together, spread, tree_of
 
@@ -221,7 +221,7 @@ def hollow_ball(inner):
 
 def cad_block():
     """The machined block; its vertices are merged, because those of its file are up to 1e-8 apart."""
-    scan = Scan(SCANS_FOLDER / "cad_block.stl")
+    scan = Scan(scan_files("cad_block")[0])
     _, first, merged = np.unique(scan.points.round(6), axis=0, return_index=True, return_inverse=True)
     return scan.points[first], merged.ravel()[scan.faces]
 

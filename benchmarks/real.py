@@ -18,7 +18,6 @@ All methods are judged above the domain and along the normal of the paper's fram
 
 import argparse
 import math
-import sys
 from collections import defaultdict
 from functools import partial
 from statistics import median
@@ -33,7 +32,7 @@ from core.bayes import process_fit
 from core.patch.monge import exponents, monomials
 from tools import blender
 
-from . import NO_SCANS, SCANS_FOLDER, machine, table
+from . import machine, scan_files, table
 from .peers import Fit, quadric_process, radial_basis
 
 PLANES, EXTENTS, STEPS = (3, 4, 5, 6), (32, 16, 8), 12
@@ -320,9 +319,7 @@ def main():
     parser.add_argument("--only", choices=("fixed", "automatic"), help="only this part")
     parser.add_argument("--scan", default="", help="only scans with this in their names")
     options = parser.parse_args()
-    paths = [path for path in sorted(SCANS_FOLDER.glob("*.*")) if options.scan in path.stem]
-    if not paths:
-        sys.exit(f"real: {NO_SCANS}")
+    paths = scan_files(options.scan)
     with blender.quiet():
         scans = [Scan(path) for path in paths]
     if options.only != "automatic":

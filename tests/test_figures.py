@@ -5,6 +5,7 @@
 import numpy as np
 import pytest
 
+import benchmarks
 from benchmarks import accuracy
 from tools import figures
 
@@ -44,3 +45,14 @@ def test_the_errors_on_random_shapes_are_those_of_the_readme_within_their_noise(
     covered = 100.0 * means(accuracy.BAYES, "covered")
     told = float(cell("planes | median", "all", "covered").split()[0])
     assert told == pytest.approx(covered.mean(), abs=3.0 * covered.std() / np.sqrt(SHAPES))
+
+
+def test_a_benchmark_without_scans_says_where_they_are_from(tmp_path, monkeypatch):
+    monkeypatch.setattr(benchmarks, "SCANS_FOLDER", tmp_path)
+    with pytest.raises(
+        SystemExit, match=r"benchmarks/SCANS.md lists into one folder, and name it by TACTILE"
+    ):
+        benchmarks.scan_files()
+    for name in ("pear.ply", "cad_block.stl"):
+        (tmp_path / name).touch()
+    assert [path.name for path in benchmarks.scan_files("cad")] == ["cad_block.stl"]
