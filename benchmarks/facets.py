@@ -183,7 +183,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("zip", type=Path, metavar="ZIP")
     arguments = parser.parse_args()
-    extension = blender.start(arguments.zip)
+    with blender.quiet():
+        extension = blender.start(arguments.zip)
     import bpy
 
     planes, add_on = sampling_planes(extension), extension.tactile_addon

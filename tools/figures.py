@@ -81,7 +81,7 @@ FIGURE = re.compile(r'(<!-- figure (\w+) "([^"]*)" "([^"]*)" (\d+) -->)[^<]*(<!-
 HEAD = """# Figures
 
 This appendix has all tables that the benchmarks print. `make figures` makes it, and fills the tables of the
-other pages from it. The line below a table names the machine, versions and commit.
+other pages from it. A line of each command names the machine, versions and commit.
 A later commit may give other figures. Times are comparable within a table only.
 """
 
