@@ -8,14 +8,14 @@ import signal
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import fields
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from .data_set import manifest
 from .data_set.folder import DataSet
-from .data_set.options import Length, Options
-from .data_set.whole_options import WholeOptions
+from .data_set.options import Length, Options, WholeOptions
 from .engine import Engine, EngineError, connected
 from .extension import core
 from .input_files import KINDS, files_of
@@ -32,7 +32,7 @@ def main(words: Sequence[str] | None = None) -> int:
     if given.dashboard and find_spec("bokeh") is None:
         parser.error("--dashboard: expected bokeh, which draws it: install bokeh")
     try:
-        options = _whole_options(given) if given.command == "whole" else _options(given)
+        options = _options(given)
         data_set, files = DataSet(given.output, options.parts), files_of(given.objects)
         manifest.begun(data_set, options)  # Nothing is written to the folder of another data set.
         with data_set.claimed():
@@ -71,24 +71,12 @@ def _interruptible() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
-def _options(given: argparse.Namespace) -> Options:
-    azimuths = given.azimuths or [180.0 * i / given.planes for i in range(given.planes)]
-    names = ("extent", "step", "noise", "tolerance")
-    lengths: dict[str, Any] = {name: vars(given)[name] and str(vars(given)[name]) for name in names}
-    return Options(
-        azimuths=tuple(azimuths),
-        tilts=tuple(given.tilts or [0.0] * len(azimuths)),
-        **lengths,
-        **{
-            name: vars(given)[name]
-            for name in ("touches", "block", "seed", "method", "degree", "weight", "solver")
-        },
-    )
-
-
-def _whole_options(given: argparse.Namespace) -> WholeOptions:
-    tolerance = given.tolerance and str(given.tolerance)
-    return WholeOptions(given.seed, str(given.noise), tolerance, given.most)
+def _options(given: argparse.Namespace) -> Options | WholeOptions:
+    if given.command == "touch":
+        given.azimuths = given.azimuths or [180.0 * i / given.planes for i in range(given.planes)]
+        given.tilts = given.tilts or [0.0] * len(given.azimuths)
+    kind: Any = Options if given.command == "touch" else WholeOptions
+    return kind(**{field.name: getattr(given, field.name) for field in fields(kind)})
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -140,7 +128,7 @@ def _add_touches(add: Any) -> None:
     help = "length of each half curve, in the object's unit or as 6%% of its size (as far as can be trusted)"
     add("--extent", **length, help=help)
     add("--step", **length, help="distance between contacts (such that more would add little)")
-    add("--noise", **length, default=Length(0.0, False), help="standard deviation of the sensor (0)")
+    add("--noise", **length, default="0", help="standard deviation of the sensor (0)")
     help = "add planes until heights are accurate to this (no planes are added)"
     add("--tolerance", **length, help=help)
     add("--method", choices=core.METHODS, default="bayes", help="how to fit (%(default)s)")
@@ -153,15 +141,15 @@ def _add_whole(add: Any) -> None:
     """Adds the options of how to touch all over, which are all in the manifest."""
     add("--seed", type=int, default=0, help="seed of the first place and the noise (%(default)s)")
     help = "standard deviation of the sensor (0)"
-    add("--noise", type=_length, metavar="LENGTH", default=Length(0.0, False), help=help)
+    add("--noise", type=_length, metavar="LENGTH", default="0", help=help)
     help = "standard deviation to reach for each patch's height (0.2%% of the object's size)"
     add("--tolerance", type=_length, metavar="LENGTH", help=help)
     add("--most", type=_count, default=1000, metavar="COUNT", help="touches per object at most (%(default)s)")
 
 
-def _length(text: str) -> Length:
+def _length(text: str) -> str:
     try:
-        return Length.of(text)
+        return str(Length.of(text))
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
 
