@@ -32,7 +32,10 @@ def scan_files(words=""):
 
 
 def commit():
-    """The commit of the code, "later than" it if files were changed since; nothing outside a checkout."""
+    """The commit of the code, "later than" it if files were changed since; nothing outside a checkout.
+
+    Files in docs do not count: `make figures` writes there after each command.
+    """
 
     def git(*words):
         run = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=False)
@@ -41,7 +44,7 @@ def commit():
     if shutil.which("git") is None or not (ROOT / ".git").exists():
         return ""
     head = git("rev-parse", "--short", "HEAD")
-    return f"later than {head}" if git("status", "--porcelain", "--untracked-files=no") else head
+    return f"later than {head}" if git("status", "--porcelain", "--untracked-files=no", ":!docs") else head
 
 
 def machine(*packages):

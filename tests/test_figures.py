@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a small run of benchmarks.accuracy finds is what the README and the first table of the pages have."""
 
+import shutil
+import subprocess
+
 import numpy as np
 import pytest
 
@@ -56,3 +59,25 @@ def test_a_benchmark_without_scans_says_where_they_are_from(tmp_path, monkeypatc
     for name in ("pear.ply", "cad_block.stl"):
         (tmp_path / name).touch()
     assert [path.name for path in benchmarks.scan_files("cad")] == ["cad_block.stl"]
+
+
+def test_figures_that_are_kept_do_not_make_the_code_a_later_one(tmp_path, monkeypatch):
+    if shutil.which("git") is None:
+        pytest.skip("needs git")
+
+    def git(*words):
+        author = ("-c", "user.name=a", "-c", "user.email=a@b")
+        subprocess.run(["git", *author, *words], cwd=tmp_path, check=True, capture_output=True)
+
+    (tmp_path / "docs").mkdir()
+    for name in ("code.py", "docs/figure.txt"):
+        (tmp_path / name).write_text("old")
+    git("init")
+    git("add", "--all")
+    git("commit", "--message", "old")
+    monkeypatch.setattr(benchmarks, "ROOT", tmp_path)
+    (tmp_path / "docs" / "figure.txt").write_text("new")
+    head = benchmarks.commit()
+    assert len(head) >= 7 and "later" not in head
+    (tmp_path / "code.py").write_text("new")
+    assert benchmarks.commit() == f"later than {head}"
