@@ -25,6 +25,16 @@ from .run import Run, StoppedError, summed_up
 WRONG_WORDS, STOPPED, WITH_ERRORS, INTERRUPTED = 2, 1, 3, 130  # The exit codes.
 
 
+def _length(text: str) -> str:
+    try:
+        return str(Length.of(text))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+LENGTH: dict[str, Any] = {"type": _length, "metavar": "LENGTH"}
+
+
 def main(words: Sequence[str] | None = None) -> int:
     """Makes a data set, and returns the exit code."""
     parser = _parser()
@@ -96,7 +106,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_work(add: Any) -> None:
-    """Adds the options of what to touch, and on which workers."""
+    """Adds the options of both commands: what to touch, with which noise, and on which workers."""
     help = f"{', '.join(KINDS)} files, folders of them, or .txt lists of these"
     add("objects", nargs="+", type=Path, metavar="OBJECT", help=help)
     add("--output", type=Path, required=True, metavar="FOLDER", help="folder of the data set, new or begun")
@@ -107,30 +117,24 @@ def _add_work(add: Any) -> None:
     add("--dashboard", metavar="ADDRESS", help=help)
     help = "seconds that a block may take before it is ended (%(default)s)"
     add("--limit", type=_positive, default=600.0, metavar="SECONDS", help=help)
+    add("--seed", type=int, default=0, help="seed of places and noise (%(default)s)")
+    add("--noise", **LENGTH, default="0", help="standard deviation of the sensor (0)")
 
 
 def _add_touches(add: Any) -> None:
     """Adds the options of how to touch, which are all in the manifest."""
     add("--touches", type=_count, default=1000, help="touches per object (%(default)s)")
     add("--block", type=_count, default=500, help="touches per task and file (%(default)s)")
-    add("--seed", type=int, default=0, help="seed of places and noise (%(default)s)")
-    add(
-        "--planes",
-        type=int,
-        choices=range(3, 7),
-        default=3,
-        help="number of evenly spaced sampling planes (3)",
-    )
+    help = "number of evenly spaced sampling planes (3)"
+    add("--planes", type=int, choices=range(3, 7), default=3, help=help)
     degrees = {"type": float, "nargs": "+", "metavar": "DEGREES"}
     add("--azimuths", **degrees, help="directions of planes that are not evenly spaced")
     add("--tilts", **degrees, help="tilts of the planes, one each (0)")
-    length = {"type": _length, "metavar": "LENGTH"}
     help = "length of each half curve, in the object's unit or as 6%% of its size (as far as can be trusted)"
-    add("--extent", **length, help=help)
-    add("--step", **length, help="distance between contacts (such that more would add little)")
-    add("--noise", **length, default="0", help="standard deviation of the sensor (0)")
+    add("--extent", **LENGTH, help=help)
+    add("--step", **LENGTH, help="distance between contacts (such that more would add little)")
     help = "add planes until heights are accurate to this (no planes are added)"
-    add("--tolerance", **length, help=help)
+    add("--tolerance", **LENGTH, help=help)
     add("--method", choices=core.METHODS, default="bayes", help="how to fit (%(default)s)")
     add("--degree", choices=["auto", *"23456"], default="auto", help="degree of the polynomial (%(default)s)")
     add("--weight", type=_positive, help="lambda L^2 of tagc (1000) and quadratic-variation (1e5)")
@@ -139,19 +143,9 @@ def _add_touches(add: Any) -> None:
 
 def _add_whole(add: Any) -> None:
     """Adds the options of how to touch all over, which are all in the manifest."""
-    add("--seed", type=int, default=0, help="seed of the first place and the noise (%(default)s)")
-    help = "standard deviation of the sensor (0)"
-    add("--noise", type=_length, metavar="LENGTH", default="0", help=help)
     help = "standard deviation to reach for each patch's height (0.2%% of the object's size)"
-    add("--tolerance", type=_length, metavar="LENGTH", help=help)
+    add("--tolerance", **LENGTH, help=help)
     add("--most", type=_count, default=1000, metavar="COUNT", help="touches per object at most (%(default)s)")
-
-
-def _length(text: str) -> str:
-    try:
-        return str(Length.of(text))
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def _count(text: str) -> int:
