@@ -22,14 +22,13 @@ from time import process_time
 
 import numpy as np
 
-import core
 from tests import solids
 from tools import blender
 
 from . import machine, scan_files, table
 from .atlas_shapes import print_shapes
 from .real import Scan
-from .whole import EDGE, NOISE, away, contacts_of, tree_of
+from .whole import EDGE, away, contacts_of, touched_all_over, tree_of
 
 SCANS = ("pear", "lemon", "bottle", "asteroid", "stone")
 TOLERANCES = (0.016, 0.008, 0.004, 0.002, 0.001)
@@ -83,15 +82,8 @@ def three(off):
 
 def explored(thing, tolerance):
     """(atlas, explorations, CPU seconds of touching and joining, CPU seconds of meshing, mesh)."""
-    start, found = process_time(), []
-    steps = core.touch_all_over(
-        thing, thing.start, thing.outward, tolerance=tolerance, noise=NOISE, most=MOST, rng=0
-    )
-    try:
-        while True:
-            found += next(steps).found
-    except StopIteration as end:
-        atlas = end.value
+    start = process_time()
+    atlas, found, _ = touched_all_over(thing, thing.start, thing.outward, tolerance, most=MOST, rng=0)
     touched = process_time()
     mesh = atlas.mesh(EDGE)
     return atlas, found, touched - start, process_time() - touched, mesh

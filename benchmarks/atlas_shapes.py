@@ -28,7 +28,7 @@ from tools import blender
 
 from . import machine, scan_files, table
 from .real import Scan
-from .whole import EDGE, NOISE, away, contacts_of, poisson, put_together, spread, tree_of
+from .whole import EDGE, NOISE, away, contacts_of, poisson, put_together, spread, touched_all_over, tree_of
 
 TOLERANCES = (0.002, 0.008)
 THINNEST = 10.0  # Objects are touched with a tolerance if no wall is thinner than this many of it.
@@ -293,16 +293,7 @@ def touched(thing, tolerance, number):
         found = core.explore_many(thing, points[some], normals, **wanted)
         found = [e for e in found if not isinstance(e, ValueError)]
         return put_together(found, tolerance), found, SHELLS
-    point, normal = thing.start(number)
-    steps = core.touch_all_over(thing, point, normal, tolerance=tolerance, noise=NOISE, rng=number)
-    found, done = [], 0
-    try:
-        while True:
-            progress = next(steps)
-            found += progress.found
-            done = progress.done
-    except StopIteration as end:
-        return end.value, found, done
+    return touched_all_over(thing, *thing.start(number), tolerance, rng=number)
 
 
 def apart(thing, vertices, triangles):
