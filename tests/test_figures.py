@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a small run of benchmarks.accuracy finds is what the README and the first table of the pages have."""
 
+import csv
 import shutil
 import subprocess
 
@@ -81,3 +82,14 @@ def test_figures_that_are_kept_do_not_make_the_code_a_later_one(tmp_path, monkey
     assert len(head) >= 7 and "later" not in head
     (tmp_path / "code.py").write_text("new")
     assert benchmarks.commit() == f"later than {head}"
+
+
+def test_nothing_in_the_chart_is_nearer_with_the_same_curves_and_little_is_faster():
+    text = (figures.DOCS / "charts" / "speed_accuracy.csv").read_text(encoding="utf-8")
+    rows = list(csv.DictReader(text.splitlines()[1:]))
+    for noise in {row["noise mm"] for row in rows}:
+        fits = [r for r in rows if r["noise mm"] == noise and "(hollow)" not in r["meaning"]]
+        (default,) = (row for row in fits if row["method"] == "auto")
+        best = min(float(row["um median"]) for row in fits if row["um median"] != "nan")
+        assert float(default["um median"]) == best
+        assert float(default["ms median"]) - min(float(row["ms median"]) for row in fits) < 1.0
