@@ -6,9 +6,11 @@ import ast
 import csv
 import math
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from core.atlas import curvature, expected, object_atlas, samples, touching
 from core.atlas import measured as atlas_measured
@@ -38,6 +40,14 @@ def of(module, name):
             value = eval(compile(ast.Expression(node.value), module, "eval"), {"math": math})
             return value[names.index(name)] if isinstance(value, tuple) else value
     raise AttributeError(name)
+
+
+def of_toml(file, *keys):
+    """The number in the words at these keys of a file, such as 3.11 in ">=3.11"."""
+    found = tomllib.loads((ROOT / file).read_text(encoding="utf-8"))
+    for key in keys:
+        found = found[key]
+    return float(re.search(r"\d+\.\d+", found)[0])
 
 
 # A page, the words around each number there, and the numbers of the code. WORDS has # for a number.
@@ -96,6 +106,9 @@ PROMISES = [
     ("messages", "no more than six of them are side by side", len(monge.QUADRIC) / 6),
     ("messages", "is half the object's size", 2 * of("tactile_addon/touch/touch_object", "FARTHEST_SHARE")),
     ("messages", "by more than a tenth of its size", 10 * common_point.MAX_OFFSET),
+    ("index", "into the window of Blender (# to", of_toml("blender_manifest.toml", "blender_version_min")),
+    ("scripting", "for Python # or later", of_toml("pyproject.toml", "project", "requires-python")),
+    ("../CONTRIBUTING", "tries # inputs each", settings.get_profile("long").max_examples),
     ("contacts", "Tactile Patch contacts, version #,", comments.FORMAT_VERSION),
     ("contacts", "each with three contacts besides the point", curves.LEAST_CONTACTS / 3),
     ("contacts", "by more than a tenth of their size an error", 10 * common_point.MAX_OFFSET),
