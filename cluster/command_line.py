@@ -9,7 +9,6 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -37,19 +36,14 @@ LENGTH: dict[str, Any] = {"type": _length, "metavar": "LENGTH"}
 
 def main(words: Sequence[str] | None = None) -> int:
     """Makes a data set, and returns the exit code."""
-    parser = _parser()
-    given = parser.parse_args(words)
-    if given.dashboard and find_spec("bokeh") is None:
-        parser.error("--dashboard: expected bokeh, which draws it: install bokeh")
+    given = _parser().parse_args(words)
     try:
         options = _options(given)
         data_set, files = DataSet(given.output, options.parts), files_of(given.objects)
         manifest.begun(data_set, options)  # Nothing is written to the folder of another data set.
         with data_set.claimed():
             run = Run(data_set, options, files)
-            with _interruptible(), connected(given.scheduler, given.workers, given.dashboard) as client:
-                if given.dashboard:
-                    print(f"Dashboard: {client.dashboard_link}", file=sys.stderr)
+            with _interruptible(), connected(given.scheduler, given.workers) as client:
                 if not client.scheduler_info(n_workers=1)["workers"]:
                     print("The scheduler has no workers yet: waiting for them", file=sys.stderr)
                 run.work(Engine(client, given.limit))
@@ -113,8 +107,6 @@ def _add_work(add: Any) -> None:
     add("--scheduler", metavar="ADDRESS", help="address of a Dask scheduler that has workers")
     help = "processes on this machine, if no scheduler is given (%(default)s)"
     add("--workers", type=_count, default=os.cpu_count(), metavar="COUNT", help=help)
-    help = "address to show Dask's dashboard at, such as :8787; it needs bokeh"
-    add("--dashboard", metavar="ADDRESS", help=help)
     help = "seconds that a block may take before it is ended (%(default)s)"
     add("--limit", type=_positive, default=600.0, metavar="SECONDS", help=help)
     add("--seed", type=int, default=0, help="seed of places and noise (%(default)s)")

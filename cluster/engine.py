@@ -57,7 +57,7 @@ class Outcome(NamedTuple):
 
 
 @contextmanager
-def connected(scheduler: str | None, workers: int, dashboard: str | None) -> Iterator[Client]:
+def connected(scheduler: str | None, workers: int) -> Iterator[Client]:
     """A client of the scheduler at an address, or of a new one with `workers` workers on this machine."""
     if scheduler is None:
         with (
@@ -69,7 +69,7 @@ def connected(scheduler: str | None, workers: int, dashboard: str | None) -> Ite
                 memory_limit=0,
                 silence_logs=logging.ERROR,
                 preload=[PRELOAD],
-                dashboard_address=dashboard or "127.0.0.1:0",
+                dashboard_address="127.0.0.1:0",
             ) as cluster,
             Client(cluster) as client,
         ):
@@ -101,16 +101,14 @@ class Engine:
         """
         out = {self._submitted(order): order for order in orders}
         running = as_completed(list(out))
-        for batch in running.batches():
-            ended = {future: out.pop(future) for future in batch}
-            outcomes = self._outcomes(ended)
-            for future, order in ended.items():
-                if future in outcomes:
-                    yield Outcome(order, *outcomes[future])
-                else:
-                    again = self._submitted(order)
-                    out[again] = order
-                    running.add(again)
+        for future in running:
+            order = out.pop(future)
+            if (outcome := _outcome(future, order)) is not None:
+                yield outcome
+            else:
+                again = self._submitted(order)
+                out[again] = order
+                running.add(again)
 
     @property
     def threads(self) -> int:
@@ -128,27 +126,26 @@ class Engine:
         words = (order.label, self.limit, order.name, *order.arguments)
         return self.client.submit(task.perform, *words, key=key, pure=False)
 
-    def _outcomes(self, orders: dict[Future[Any], Order]) -> dict[Future[Any], tuple[str, Any, list[str]]]:
-        """How orders went, by their futures; those that are lost are left out."""
-        found: dict[Future[Any], tuple[str, Any, list[str]]] = {}
-        finished = [future for future in orders if future.status == "finished"]
-        with suppress(CancelledError, OSError, TimeoutError):
-            found |= zip(finished, self.client.gather(finished), strict=True)
-        for future, order in orders.items():
-            if future.status == "error":
-                error = future.exception()
-                if not isinstance(error, KilledWorker):
-                    words = " ".join(str(error).split()).partition(". ")[0]
-                    raise EngineError(
-                        f"the scheduler or a worker cannot take orders ({words}): start them in the same "
-                        "environment, with this checkout on their PYTHONPATH"
-                    ) from error
-                found[future] = FAILED, GONE, [f"{order.label}: {GONE}"]
-        return found
-
     def _require_scheduler(self) -> None:
         """Waits for a scheduler that was restarted."""
         while self.client.status == "connecting":
             sleep(0.1)
         if self.client.status != "running":
             raise EngineError("the scheduler is gone: start it again, and then this command")
+
+
+def _outcome(future: Future[Any], order: Order) -> Outcome | None:
+    """How an order went, or None if it is lost. Raises EngineError if it cannot be taken."""
+    if future.status == "finished":
+        with suppress(CancelledError, OSError, TimeoutError):
+            return Outcome(order, *future.result())
+    if future.status != "error":
+        return None
+    error = future.exception()
+    if isinstance(error, KilledWorker):
+        return Outcome(order, FAILED, GONE, [f"{order.label}: {GONE}"])
+    words = " ".join(str(error).split()).partition(". ")[0]
+    raise EngineError(
+        f"the scheduler or a worker cannot take orders ({words}): start them in the same environment, with "
+        "this checkout on their PYTHONPATH"
+    ) from error
