@@ -9,6 +9,7 @@ import os
 import platform
 import shutil
 import subprocess
+import sys
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
@@ -24,8 +25,17 @@ NO_SCANS = (
 )
 
 
+def scan_files(words=""):
+    """The files of the scans with `words` in their names, sorted. Ends the command if there are none."""
+    found = sorted(path for path in SCANS_FOLDER.glob("*.*") if words in path.stem)
+    return found or sys.exit(NO_SCANS)
+
+
 def commit():
-    """The commit of the code, "later than" it if files were changed since; nothing outside a checkout."""
+    """The commit of the code, "later than" it if files were changed since; nothing outside a checkout.
+
+    Files in docs do not count: `make figures` writes there after each command.
+    """
 
     def git(*words):
         run = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=False)
@@ -34,7 +44,7 @@ def commit():
     if shutil.which("git") is None or not (ROOT / ".git").exists():
         return ""
     head = git("rev-parse", "--short", "HEAD")
-    return f"later than {head}" if git("status", "--porcelain", "--untracked-files=no") else head
+    return f"later than {head}" if git("status", "--porcelain", "--untracked-files=no", ":!docs") else head
 
 
 def machine(*packages):

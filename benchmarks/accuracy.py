@@ -28,7 +28,6 @@ import numpy as np
 
 from core import SamplingPlane, reconstruct, track
 from core.patch.domain import closed_spline_domain
-from core.patch.monge import exponents, monomials
 from tests import surfaces
 
 from . import machine, table
@@ -244,17 +243,6 @@ if find_spec("sklearn") is None:
 SHAPE_METHODS = [method for method in (BAYES, TAGC, PROCESS, CUBIC) if method in METHODS]
 
 
-def cramer_rao(case):
-    """The median of the larger kappa error (1/mm) of an unbiased estimate of the terms to degree 4."""
-    contacts = np.vstack([c.points for c in case.contours]) - case.point
-    contacts = contacts[np.linalg.norm(contacts, axis=1) > 0.0] @ case.axes
-    radius = np.abs(contacts).max()
-    inverse = np.linalg.pinv(monomials(contacts / radius, exponents(1, 4)), rcond=1e-6)
-    rows = 2.0 * case.noise / radius**2 * inverse[[2, 4]]
-    draws = rows @ np.random.default_rng(0).normal(size=(rows.shape[1], 1000))
-    return float(np.median(np.abs(draws).max(axis=0)))
-
-
 # Measures --------------------------------------------------------------------------------------------
 
 
@@ -282,8 +270,7 @@ def score(fit, case):
 def exact_scores(key):
     name, planes, noise, seed = key
     case = exact_case(name, planes, noise, 1000 * seed + list(SURFACES).index(name))
-    scores = {m: score(fit(case), case) for m, fit in METHODS.items()}
-    return scores | {"Cramér-Rao": cramer_rao(case)}
+    return {m: score(fit(case), case) for m, fit in METHODS.items()}
 
 
 def random_scores(seed):
@@ -316,14 +303,13 @@ def milliseconds():
 CELLS = [(planes, noise) for planes in EXACT_PLANES for noise in NOISES]
 
 
-def median_of(scores, value, planes, noise):
-    """The median over surfaces of the mean over seeds."""
-    of = [[value(s) for k, s in scores.items() if k[:3] == (name, planes, noise)] for name in SURFACES]
-    return float(np.median([np.mean(v) for v in of]))
-
-
 def median_score(scores, measure, method, planes, noise):
-    return median_of(scores, lambda s: getattr(s[method], measure), planes, noise)
+    """The median over surfaces of the mean over seeds."""
+    of = (
+        [getattr(s[method], measure) for k, s in scores.items() if k[:3] == (name, planes, noise)]
+        for name in SURFACES
+    )
+    return float(np.median([np.mean(values) for values in of]))
 
 
 def error_table(scores, times):
@@ -353,35 +339,14 @@ def frame_table(scores):
     print("Medians of the larger kappa error in 1e-3 / mm, and of the error of the normal in degrees.\n")
     plane = EXACT_PLANES[0]
     head = ["method, 0/60/120", *(f"kappa, {n:g}" for n in NOISES), *(f"normal, {n:g}" for n in NOISES)]
-    names = {BAYES: BAYES, QUADRIC: "the paper's frame (all its fits)"} | {
-        m: m for m in METHODS if "jet" in m
-    }
+    names = {BAYES: BAYES, QUADRIC: "the paper's frame (all its fits)"}
+    names |= {m: m for m in METHODS if "jet" in m}
+    cells = [(what, noise) for what in ("kappa", "normal") for noise in NOISES]
     rows = [
-        [
-            name,
-            *(
-                f"{median_score(scores, what, m, plane, n):.2f}"
-                for what in ("kappa", "normal")
-                for n in NOISES
-            ),
-        ]
-        for m, name in names.items()
+        [name, *(f"{median_score(scores, what, method, plane, noise):.2f}" for what, noise in cells)]
+        for method, name in names.items()
     ]
-    bound = [f"{1e3 * median_of(scores, lambda s: s['Cramér-Rao'], plane, n):.2f}" for n in NOISES]
-    table(head, [*rows, ["Cramér-Rao bound, degree 4", *bound, "", "", ""]])
-
-
-def surface_table(scores):
-    """Prints where each method fails, which medians over the surfaces do not show."""
-    print("Errors by surface in um, medians over seeds: with planes 0/60/120 and 0.02 mm of noise, and with")
-    print("tilted planes and no noise.\n")
-    methods = [m for m in (BAYES, PROCESS, CUBIC, TAGC, QUADRIC) if m in METHODS]
-    cells = ((EXACT_PLANES[0], 0.02), (EXACT_PLANES[2], 0.0))
-    rows = []
-    for name in SURFACES:
-        of = [[s for k, s in scores.items() if k[:3] == (name, *cell)] for cell in cells]
-        rows.append([name, *(f"{median(s[m].error for s in cell):.0f}" for cell in of for m in methods)])
-    table(["surface", *(f"{m}{text}" for text in (", 0.02", ", tilted, 0") for m in methods)], rows)
+    table(head, rows)
 
 
 def _interval(scores):
@@ -406,20 +371,8 @@ def random_table(scores):
             *ratios,
             *_interval(of[BAYES]),
         ])  # fmt: skip
-    table(
-        [
-            "planes",
-            "median",
-            "mean",
-            "p99 / median",
-            "mean / TAGC's",
-            "mean / process's",
-            "mean / cubic's",
-            "covered",
-            "width",
-        ],
-        rows,
-    )
+    ratios = ("mean / TAGC's", "mean / process's", "mean / cubic's")
+    table(["planes", "median", "mean", "p99 / median", *ratios, "covered", "width"], rows)
 
 
 def main():
@@ -440,7 +393,6 @@ def main():
         random = list(pool.map(random_scores, range(options.shapes), chunksize=4))
     error_table(exact, times)
     frame_table(exact)
-    surface_table(exact)
     random_table(random)
     print(f"Seeds {options.seeds}, {options.shapes} shapes; {machine('numpy', 'scipy')}.")
 

@@ -23,7 +23,7 @@ from PIL import Image
 from tests.solids import topology
 from tools import blender, demo
 
-from . import ROOT, SCANS_FOLDER, machine, table
+from . import ROOT, machine, scan_files, table
 
 APART, SIZE = 1.1, 1.05  # The distance of objects in the picture, and the length of their diagonals.
 COLUMNS, WIDTH, SAMPLES = 6, 1800, 48
@@ -72,7 +72,7 @@ def scans():
     standing = (math.radians(90.0), 0.0, 0.0)  # Of what lies along the second axis.
 
     def scan(name):
-        bpy.ops.wm.ply_import(filepath=str(SCANS_FOLDER / f"{name}.ply"))
+        bpy.ops.wm.ply_import(filepath=str(scan_files(name)[0]))
         bpy.ops.object.shade_smooth()
         made = bpy.context.object
         made.rotation_euler = standing if max(made.dimensions) > made.dimensions.z else (0.0, 0.0, 0.0)

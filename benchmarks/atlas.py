@@ -4,8 +4,7 @@
 
 `python -m benchmarks.atlas [--only NAME] [--finest T] [--coarsest T]`, from the root of a checkout. It needs
 bpy to read the scans and to cast rays. Each object has the size 1, and contacts have a noise of .0005. The
-command draws build/charts/atlas.png and prints Markdown tables; with --redraw it only draws
-docs/charts/atlas.csv again:
+command prints Markdown tables:
 
 (a) each object at five tolerances: the numbers of touches and contacts, and CPU seconds; the distances of
     points of the object from the mesh, and the share of these points that the field's 90 % interval holds;
@@ -23,14 +22,13 @@ from time import process_time
 
 import numpy as np
 
-import core
 from tests import solids
 from tools import blender
 
-from . import SCANS_FOLDER, machine, table
+from . import machine, scan_files, table
 from .atlas_shapes import print_shapes
 from .real import Scan
-from .whole import EDGE, NOISE, away, contacts_of, tree_of
+from .whole import EDGE, away, contacts_of, touched_all_over, tree_of
 
 SCANS = ("pear", "lemon", "bottle", "asteroid", "stone")
 TOLERANCES = (0.016, 0.008, 0.004, 0.002, 0.001)
@@ -41,7 +39,7 @@ class Scanned:
     """A scan, and random points all over it, by area."""
 
     def __init__(self, name):
-        self.scan = Scan(next(SCANS_FOLDER.glob(f"{name}*")))
+        self.scan = Scan(scan_files(name)[0])
         self.name, self.ray_cast = self.scan.name, self.scan.ray_cast
         (self.start, self.outward), *_ = self.scan.places(1, 0)
         places = list(self.scan.places(POINTS, 1))
@@ -84,15 +82,8 @@ def three(off):
 
 def explored(thing, tolerance):
     """(atlas, explorations, CPU seconds of touching and joining, CPU seconds of meshing, mesh)."""
-    start, found = process_time(), []
-    steps = core.touch_all_over(
-        thing, thing.start, thing.outward, tolerance=tolerance, noise=NOISE, most=MOST, rng=0
-    )
-    try:
-        while True:
-            found += next(steps).found
-    except StopIteration as end:
-        atlas = end.value
+    start = process_time()
+    atlas, found, _ = touched_all_over(thing, thing.start, thing.outward, tolerance, most=MOST, rng=0)
     touched = process_time()
     mesh = atlas.mesh(EDGE)
     return atlas, found, touched - start, process_time() - touched, mesh
@@ -124,7 +115,7 @@ def curved(thing, tolerance, atlas, mesh):
 
 
 def row(thing, tolerance):
-    """A row of the first table, the numbers that are drawn, and the rows of the second table."""
+    """A row of the first table, and the rows of the second table."""
     atlas, found, touching, meshing, mesh = explored(thing, tolerance)
     distance, std = atlas.distance(thing.points)
     felt = np.isfinite(std)
@@ -134,47 +125,8 @@ def row(thing, tolerance):
     contacts = len(contacts_of(found, atlas.taps)[0])
     cells = [thing.name, f"{1e3 * tolerance:g}", str(len(atlas.patches)), str(contacts)]
     cells += [f"{touching:.1f}", f"{meshing:.1f}", f"{100 * felt.mean():.1f}", three(off), f"{within:.2f}"]
-    cells += [
-        f"{shape.open} / {shape.euler} / {shape.pieces}",
-    ]
-    return (
-        cells,
-        (thing.name, 1e3 * tolerance, len(atlas.patches), round(touching + meshing, 2), round(off.mean(), 4)),
-        [curved(thing, tolerance, atlas, mesh)] if isinstance(thing, Exact) else [],
-    )
-
-
-NUMBERS = "At each dot is the tolerance, in ‰ of the size."
-DRAWN = ["object", "tolerance, ‰", "touches", "CPU seconds", "mean distance, ‰"]
-
-
-def draw(numbers, caption):
-    """Draws the mean distance against touches and against CPU seconds, with the tolerance at each dot."""
-    from matplotlib import ticker
-
-    from . import plot
-
-    figure, axes = plot.plt.subplots(1, 2, figsize=(10, 4.2), sharey=True, layout="constrained")
-    for name in dict.fromkeys(n[0] for n in numbers):
-        # A line leads from the coarsest tolerance to the finest.
-        of = sorted((n for n in numbers if n[0] == name), key=lambda n: -n[1])
-        _, tolerances, touches, seconds, off = zip(*of, strict=True)
-        for axis, x in zip(axes, (touches, seconds), strict=True):
-            (line,) = axis.loglog(x, off, "o-", label=name.split("_")[0], markersize=4)
-            for place in zip(x, off, tolerances, strict=True):
-                look = {"textcoords": "offset points", "fontsize": 7, "color": line.get_color()}
-                axis.annotate(f"{place[2]:g}", place[:2], (4, 3), **look)
-    axes[0].set(xlabel="touches", ylabel="mean distance, ‰ of the size")
-    axes[1].set(xlabel="CPU seconds: touches, join and mesh")
-    axes[1].legend(loc="lower right", ncols=2)
-    for axis in axes:
-        axis.grid(alpha=0.3, which="both")
-        for ticks in (axis.xaxis, axis.yaxis):
-            ticks.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
-            ticks.set_major_formatter("{x:g}")
-            ticks.set_minor_formatter(ticker.NullFormatter())
-    figure.suptitle("Whole objects: how near, by touches and by time", weight="bold")
-    plot.save(figure, "atlas", caption, DRAWN, numbers)
+    cells.append(f"{shape.open} / {shape.euler} / {shape.pieces}")
+    return cells, [curved(thing, tolerance, atlas, mesh)] if isinstance(thing, Exact) else []
 
 
 def main():
@@ -186,39 +138,27 @@ def main():
     parser.add_argument("--starts", type=int, default=8, help="number of starts of each (%(default)s)")
     parser.add_argument("--first", type=int, default=0, help="the first of these starts (%(default)s)")
     parser.add_argument("--places", type=int, default=20_000, help="places around each (%(default)s)")
-    parser.add_argument("--redraw", action="store_true", help="only draw docs/charts/atlas.csv again")
     options = parser.parse_args()
-    if options.redraw:
-        from . import plot
-
-        caption, _, numbers = plot.stored("atlas")
-        draw(numbers, caption)
-        return
+    scan_files()  # Without scans it ends now, and not after hours.
     if options.shapes:
         starts = range(options.first, options.first + options.starts)
         print_shapes(options.only, (options.finest, options.coarsest), starts, options.places)
         return
     names = [name for name in (*SCANS, "ring", "egg") if options.only in name]
-    rows, numbers, bends = [], [], []
+    rows, bends = [], []
     for name in names:
         with blender.quiet():
             thing = Scanned(name) if name in SCANS else Exact(name)
         for tolerance in (t for t in TOLERANCES if options.finest <= t <= options.coarsest):
-            cells, number, curvatures = row(thing, tolerance)
+            cells, curvatures = row(thing, tolerance)
             rows.append(cells)
             bends += curvatures
-            numbers.append(number)
     head = "object|tolerance|touches|contacts|s touch, join|s mesh|% covered|mean / median / 95 %|within 90 %"
-    table(
-        [*head.split("|"), "open edges / Euler / pieces"],
-        rows,
-    )
+    table([*head.split("|"), "open edges / Euler / pieces"], rows)
     if bends:
         head = "object|tolerance|K|off|within 90 %|H|off|within 90 %|K of angle defects off|% unknown"
         table(head.split("|"), bends)
-    versions = machine("bpy", "numpy", "scipy")
-    draw(numbers, f"{NUMBERS} On {versions}.")
-    print(f"Lengths are in ‰ of the size, times in CPU seconds; {versions}.")
+    print(f"Lengths are in ‰ of the size, times in CPU seconds; {machine('bpy', 'numpy', 'scipy')}.")
 
 
 if __name__ == "__main__":

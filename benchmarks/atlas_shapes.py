@@ -26,9 +26,9 @@ import core
 from tests import solids
 from tools import blender
 
-from . import SCANS_FOLDER, machine, table
+from . import machine, scan_files, table
 from .real import Scan
-from .whole import EDGE, NOISE, away, contacts_of, poisson, put_together, spread, tree_of
+from .whole import EDGE, NOISE, away, contacts_of, poisson, put_together, spread, touched_all_over, tree_of
 
 TOLERANCES = (0.002, 0.008)
 THINNEST = 10.0  # Objects are touched with a tolerance if no wall is thinner than this many of it.
@@ -221,7 +221,7 @@ def hollow_ball(inner):
 
 def cad_block():
     """The machined block; its vertices are merged, because those of its file are up to 1e-8 apart."""
-    scan = Scan(SCANS_FOLDER / "cad_block.stl")
+    scan = Scan(scan_files("cad_block")[0])
     _, first, merged = np.unique(scan.points.round(6), axis=0, return_index=True, return_inverse=True)
     return scan.points[first], merged.ravel()[scan.faces]
 
@@ -293,16 +293,7 @@ def touched(thing, tolerance, number):
         found = core.explore_many(thing, points[some], normals, **wanted)
         found = [e for e in found if not isinstance(e, ValueError)]
         return put_together(found, tolerance), found, SHELLS
-    point, normal = thing.start(number)
-    steps = core.touch_all_over(thing, point, normal, tolerance=tolerance, noise=NOISE, rng=number)
-    found, done = [], 0
-    try:
-        while True:
-            progress = next(steps)
-            found += progress.found
-            done = progress.done
-    except StopIteration as end:
-        return end.value, found, done
+    return touched_all_over(thing, *thing.start(number), tolerance, rng=number)
 
 
 def apart(thing, vertices, triangles):

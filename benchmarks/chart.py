@@ -2,12 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Speed against accuracy: each fit of this project, and what else one could take, on the same contacts.
 
-`python -m benchmarks.chart [--quick | --redraw]`, from the root of a checkout. A peer whose package is
-missing is left out with a message. With --redraw the stored table of docs/charts is drawn again. The command
-writes build/charts/speed_accuracy.png and .csv: milliseconds from contacts to the heights of the hold-out,
-and micrometers by which these are off, for the exact surfaces, plane sets and noise levels of
-benchmarks.accuracy (`--quick` takes one plane set and one seed). The methods take turns, case by case, in one
-process on one thread.
+`python -m benchmarks.chart [--quick]`, from the root of a checkout. A peer whose package is missing is left
+out with a message. The command writes build/charts/speed_accuracy.png and .csv: milliseconds from contacts to
+the heights of the hold-out, and micrometers by which these are off, for the exact surfaces, plane sets and
+noise levels of benchmarks.accuracy (`--quick` takes one plane set and one seed). The methods take turns, case
+by case, in one process on one thread.
 """
 
 import argparse
@@ -64,11 +63,6 @@ LOOKS = {
     PROCESSES: (plot.PURPLE, "D"),
     SPLINES: (plot.ORANGE, "v"),
     MESHES: (plot.BLACK, "X"),
-}
-# Methods that do not look as the rest of their family.
-OWN_LOOKS = {
-    "jet 3": LOOKS[INTERPOLATION],
-    "jet 4": LOOKS[INTERPOLATION],
 }
 
 
@@ -268,7 +262,7 @@ def panel(axes, marks, noise, limits, off_scale):
         ticks.set_major_formatter(lambda value, _: f"{value:g}" if value < off_scale else "")
     texts, places, beyond = [], [], 0
     for mark in marks:
-        color, shape = OWN_LOOKS.get(mark.label, LOOKS[mark.family])
+        color, shape = LOOKS[mark.family]
         x, y, text = mark.x[1], mark.y[1], mark.label
         if y > off_scale:
             text = f"{text} ↑ {y / 1e3:.1f} mm" if y < 1e4 else f"{text} ↑ {y / 1e3:.0f} mm"
@@ -302,21 +296,17 @@ def pareto(axes, marks):
 def key(axes, methods):
     """Writes what the labels stand for, family by family."""
     axes.axis("off")
-    families = [(family, list(of)) for family, of in groupby(methods, key=lambda method: method.family)]
     lines = []
-    for i, (family, of) in enumerate(families):
-        line = len(lines)
-        lines.append((i, line, LOOKS[family], family, True))
-        for j, (says, same) in enumerate(groupby(of, key=lambda method: method.says), 1):
-            labels = [method.label for method in same]
-            look = OWN_LOOKS.get(labels[0], LOOKS[family])
-            lines.append((i, line + j, look, f"{_listed(labels)}: {says}", False))
-    height = 1.0 / (1 + max(line for _, line, *_ in lines))
-    for i, line, (color, shape), text, heading in lines:
+    for family, of in groupby(methods, key=lambda method: method.family):
+        lines.append((LOOKS[family], family, True))
+        for says, same in groupby(of, key=lambda method: method.says):
+            lines.append((LOOKS[family], f"{_listed([method.label for method in same])}: {says}", False))
+    height = 1.0 / len(lines)
+    for line, ((color, shape), text, heading) in enumerate(lines):
         y = 1.0 - (line + 0.5) * height
         look = {"color": plot.dark(color), "weight": "bold" if heading else "normal", "fontsize": 8}
         axes.text(0.04, y, text, transform=axes.transAxes, va="center", **look)
-        if heading or (color, shape) != LOOKS[families[i][0]]:
+        if heading:
             axes.plot(0.01, y, shape, color=color, ms=7.0, transform=axes.transAxes, clip_on=False)
 
 
@@ -381,12 +371,7 @@ def caption_of(methods, quick):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="one plane set and seed")
-    parser.add_argument("--redraw", action="store_true", help="draw the tables of docs/charts again")
     options = parser.parse_args()
-    if options.redraw:
-        caption, *table = plot.stored("speed_accuracy")
-        draw_heights(table, METHODS, caption)
-        return
     methods = available(METHODS)
     results = measured(methods, options.quick)
     draw_heights(rows_of(methods, results), methods, caption_of(methods, options.quick))

@@ -24,14 +24,13 @@ from time import process_time
 import numpy as np
 from scipy.spatial.distance import cdist
 
-import core
 from tests import solids
 from tools import blender
 
 from . import machine, table
 from .atlas_shapes import Made, scattered
 from .real import Scan
-from .whole import EDGE, NOISE, away, contacts_of, poisson, tree_of
+from .whole import EDGE, away, contacts_of, poisson, touched_all_over, tree_of
 
 PLACES, POINTS, MARGIN = 10_000, 2500, 0.02
 MOST_TOUCHES, MOST_CONTACTS = 1500, 1000  # A process takes this many contacts, evenly chosen.
@@ -94,15 +93,8 @@ def best_of_the_peers(thing, places, truth, contacts):
 
 def touched(thing, tolerance):
     """(atlas, explorations, CPU seconds with the mesh, mesh) of an object touched all over."""
-    start, found = process_time(), []
-    steps = core.touch_all_over(
-        thing, *thing.start(0), tolerance=tolerance, noise=NOISE, most=MOST_TOUCHES, rng=0
-    )
-    try:
-        while True:
-            found += next(steps).found
-    except StopIteration as end:
-        atlas = end.value
+    start = process_time()
+    atlas, found, _ = touched_all_over(thing, *thing.start(0), tolerance, most=MOST_TOUCHES, rng=0)
     mesh = atlas.mesh(EDGE)
     return atlas, found, process_time() - start, mesh
 

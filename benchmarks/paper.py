@@ -3,19 +3,17 @@
 """The experiments of Jia and Tian's sections IV and V again, with the paper's figures for comparison.
 
 `python -m benchmarks.paper ZIP`, from the root of a checkout; ZIP is the built extension. Blender, with it
-installed, reads the scans and draws the pictures. The command prints Markdown:
+installed, reads the scans. The command prints Markdown:
 
 (a) Figures 3 and 4: a bottle's neck under no constraint and by TAGC, verified on nine more curves;
 (b) Table II: distances of contacts and of mesh vertices to the patches.
 
-Table I and the two patches of Figures 3 and 4 are drawn to build/paper/*.jpg. Without the scans, only exact
-surfaces are touched. Lengths are in mm.
+Without the scans, only exact surfaces are touched. Lengths are in mm.
 """
 
 import argparse
 from collections.abc import Callable
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,7 +23,7 @@ import core
 from tests import surfaces
 from tools import blender
 
-from . import SCANS_FOLDER, accuracy, machine, paper_pictures, table, timed
+from . import NO_SCANS, SCANS_FOLDER, accuracy, machine, table, timed
 from .scans import AZIMUTHS, SCANS
 
 NOISE = 0.05  # The noise of a contact: the paper's fits are off their contacts by as much.
@@ -34,9 +32,6 @@ TURN = 60.0 / SEEDS  # Planes turn by this many degrees from seed to seed, so th
 NINE = (15.0, 30.0, 45.0, 75.0, 90.0, 105.0, 135.0, 150.0, 165.0)  # The azimuths of the verifying curves.
 LEAN = np.array([3.0, -2.0, 4.0])  # Angles in degrees by which the three planes lean from the normal,
 LEANS = (0.0, 1.0, 2.0, 4.0)  # and the multiples of these angles that are tried.
-DRAWN = 2.0  # With this multiple the fit without a constraint is off by about as much as the paper's.
-# The rows of Table I that are drawn, with their labels. The lemon stands for the paper's pebble.
-DRAWN_ROWS = {"shell": "shell", "pear": "pear", "pebble": "lemon"}
 NECK_EXTENT, NECK_STEPS = 11.7, 9
 VERTICES = 1500  # The number of points on an exact surface that count as its vertices.
 LEAST_SQUARES, TAGC, QV, BAYES = "least-squares", "tagc", "quadratic-variation", "bayes"
@@ -233,11 +228,7 @@ def print_figures(measured):
 
 
 def _leaning(lean):
-    return f"{EXACT_NECK}, planes leaning {_degrees(lean)}" if lean else EXACT_NECK
-
-
-def _degrees(lean):
-    return "/".join(f"{angle:g}" for angle in lean * LEAN) + " degrees" if lean else "upright"
+    return f"{EXACT_NECK}, planes leaning {'/'.join(f'{angle:g}' for angle in lean * LEAN)} degrees"
 
 
 def print_table(tested):
@@ -269,72 +260,25 @@ def _distances(row):
     ]
 
 
-# Pictures ----------------------------------------------------------------------------------------------
-
-
-def draw_neck(extension, neck):
-    """Draws Figures 3 and 4 for the seed with the median error of TAGC; returns {method: error in mm}."""
-    seed = int(np.argsort(figures(neck, TAGC, lean=DRAWN)[TAGC][:, 1])[SEEDS // 2])
-    errors = {}
-    for method in (LEAST_SQUARES, TAGC):
-        r, points, _ = fitted(neck, method, seed, DRAWN)
-        nine = _in_frame(r, neck.contours(NINE, seed + 1000 * SEEDS))
-        paper_pictures.draw_neck(extension, method, r, points, nine)
-        errors[method] = core.fit_error(r.patch, nine)
-    return errors
-
-
-def draw_sheets(scanned, errors):
-    if scanned:
-        titles = ("the reference point", "from outside", "from inside")
-        pictures = [[f"{name}_{column}" for column in (1, 2, 3)] for name in DRAWN_ROWS]
-        caption = (
-            "blue: the TAGC patch, where the mesh does not hide it · red lines: data curves\n"
-            "brown arrows: the Darboux frame"
-        )
-        paper_pictures.sheet("table_1", pictures, titles, DRAWN_ROWS.values(), caption)
-    titles = (
-        f"no constraint (Figure 3b): {errors[LEAST_SQUARES]:.1f} mm off",
-        f"TAGC (Figure 4): {errors[TAGC]:.2f} mm off",
-    )
-    caption = (
-        "large red balls: 57 contacts · small blue ones: 171 points on nine more curves, their mean error"
-        f" above\nplanes leaning {_degrees(DRAWN)} · the left patch goes on: it is cut off"
-        f" {paper_pictures.TALL:.0f} mm above and below the point"
-    )
-    paper_pictures.sheet("figures_3_4", [[LEAST_SQUARES, TAGC]], titles, (), caption)
-
-
-# -------------------------------------------------------------------------------------------------------
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("zip", type=Path, help="the built extension")
     options = parser.parse_args()
     scanned = all((SCANS_FOLDER / scan.file).is_file() for scan in SCANS[:4])
-    draws = find_spec("matplotlib") is not None
     neck, *others = exact_places()
     measured = {EXACT_NECK: figures(neck, *METHODS)}
     measured |= {_leaning(lean): figures(neck, LEAST_SQUARES, lean=lean) for lean in LEANS[1:]}
     tested = [tested_at(place, EXACT) for place in (neck, *others)]
     with blender.quiet():
-        extension = blender.start(options.zip)
-        for place in scan_places(extension) if scanned else ():
+        for place in scan_places(blender.start(options.zip)) if scanned else ():
             tested.append(tested_at(place, SCAN))
             if place.name == NECK:
                 measured[SCANNED_NECK] = figures(place, *METHODS)
-            elif draws:
-                r = fitted(place, TAGC, 0).result
-                paper_pictures.draw_row(extension, place, r, place.contours(AZIMUTHS, 0))
-        if draws:
-            draw_sheets(scanned, draw_neck(extension, neck))
     print(_caption(), end="\n\n")
     if not scanned:
-        print(f"All rows of scans and Table I are skipped, because there are no scans in {SCANS_FOLDER}.\n")
+        print(f"The rows of scans are left out: {NO_SCANS}.\n")
     print_figures(measured)
     print_table(tested)
-    print("Pictures: build/paper/*.jpg" if draws else "No pictures: matplotlib is missing.")
 
 
 def _caption():

@@ -3,6 +3,7 @@
 """What the charts have in common: a look that fits a README's column, colors, labels and files."""
 
 import csv
+import sys
 import textwrap
 
 import matplotlib
@@ -15,7 +16,7 @@ from matplotlib.patheffects import withStroke
 
 from . import ROOT
 
-OUTPUT, STORED = ROOT / "build" / "charts", ROOT / "docs" / "charts"
+OUTPUT = ROOT / "build" / "charts"
 LABEL_SIZE, CAPTION_SIZE = 7.5, 7.0
 # Color-blind readers can tell Okabe and Ito's colors apart. Marks and labels repeat what the colors say.
 BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION, PURPLE = (
@@ -30,36 +31,16 @@ plt.rcParams.update({
 
 def save(figure, name, caption, header, rows):
     """Writes build/charts/NAME.png, with the caption below, and NAME.csv with the table behind."""
-    picture(figure, name, caption)
-    with open(OUTPUT / f"{name}.csv", "w", newline="", encoding="utf-8") as file:
-        file.write(f"# {caption}\r\n")
-        csv.writer(file).writerows([header, *rows])
-    print(f"{(OUTPUT / name).relative_to(ROOT)}.png and .csv")
-
-
-def stored(name):
-    """The caption, the header and the rows of docs/charts/NAME.csv; what is a number comes as one."""
-    with open(STORED / f"{name}.csv", newline="", encoding="utf-8") as file:
-        caption = file.readline().removeprefix("# ").strip()
-        header, *rows = csv.reader(file)
-    return caption, header, [[_value(cell) for cell in row] for row in rows]
-
-
-def _value(cell):
-    try:
-        return float(cell)
-    except ValueError:
-        return cell
-
-
-def picture(figure, name, caption):
-    """Writes build/charts/NAME.png, with the caption below."""
     OUTPUT.mkdir(parents=True, exist_ok=True)
     # This wraps by the width of an average character: matplotlib's own wrapping forgets the tight box.
     width = int(72.0 * figure.get_figwidth() / (0.55 * CAPTION_SIZE))
-    caption = textwrap.fill(caption, width, break_on_hyphens=False)
-    figure.text(0.01, 0.0, caption, ha="left", va="top", fontsize=CAPTION_SIZE, color="#555555")
+    text = textwrap.fill(caption, width, break_on_hyphens=False)
+    figure.text(0.01, 0.0, text, ha="left", va="top", fontsize=CAPTION_SIZE, color="#555555")
     figure.savefig(OUTPUT / f"{name}.png", bbox_inches="tight", pad_inches=0.15)
+    with open(OUTPUT / f"{name}.csv", "w", newline="", encoding="utf-8") as file:
+        file.write(f"# {caption}\r\n")
+        csv.writer(file).writerows([header, *rows])
+    print(f"{(OUTPUT / name).relative_to(ROOT)}.png and .csv", file=sys.stderr)
 
 
 def dark(color):

@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How near the fits come to real surfaces, and whether their intervals are true there.
 
-`python -m benchmarks.real [--points N] [--only fixed | automatic] [--chart]`, from the root of a checkout. It
-needs bpy to read the scans and to cast rays, and scikit-learn for the Gaussian process. It prints Markdown
-tables:
+`python -m benchmarks.real [--points N] [--only fixed | automatic]`, from the root of a checkout. It needs bpy
+to read the scans and to cast rays, and scikit-learn for the Gaussian process. It prints Markdown tables:
 
 (a) Scans are touched without noise at random points (seeded, by area) with three to six planes, and half
     curves of 1/32, 1/16 and 1/8 of the object in twelve steps. The error is the mean |dz| over up to some 90
@@ -15,13 +14,10 @@ tables:
     refused, the doubts that are right, and the sure touches that are off.
 
 All methods are judged above the domain and along the normal of the paper's frame, from which the peers start.
-`--chart`, without `--only`, also draws build/charts/real_surfaces.png, and `--redraw` only draws the numbers
-of docs/charts again.
 """
 
 import argparse
 import math
-import sys
 from collections import defaultdict
 from functools import partial
 from statistics import median
@@ -36,7 +32,7 @@ from core.bayes import process_fit
 from core.patch.monge import exponents, monomials
 from tools import blender
 
-from . import NO_SCANS, SCANS_FOLDER, machine, table
+from . import machine, scan_files, table
 from .peers import Fit, quadric_process, radial_basis
 
 PLANES, EXTENTS, STEPS = (3, 4, 5, 6), (32, 16, 8), 12
@@ -251,7 +247,7 @@ def time_table(scores, seconds):
 
 
 def automatic_row(scan, count):
-    """The numbers of a row of (c), the mean error in ‰, and the worst sure error in deviations."""
+    """The numbers of a row of (c)."""
     planes = [SamplingPlane(math.pi * i / 3) for i in range(3)]
     sure, doubtful, refused, seconds = [], [], 0, []
     for point, normal in scan.places(count, 1):
@@ -274,8 +270,6 @@ def automatic_row(scan, count):
         1e3 * sum(r.domain.area for r, _ in sure),
         1e3 * median([r.radius for r, _ in sure] or [0.0]),
         1e3 * median(seconds or [0.0]),
-        1e3 * np.mean([off / r.radius for r, off in sure + doubtful]),
-        max([off / r.mean_height_std for r, off in sure], default=0.0),
     ]
 
 
@@ -323,18 +317,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--points", type=int, default=100, help="of each scan (%(default)s)")
     parser.add_argument("--only", choices=("fixed", "automatic"), help="only this part")
-    parser.add_argument("--chart", action="store_true", help="draw the chart as well")
     parser.add_argument("--scan", default="", help="only scans with this in their names")
-    parser.add_argument("--redraw", action="store_true", help="only draw docs/charts/real_surfaces.csv again")
     options = parser.parse_args()
-    if options.redraw:
-        from . import plot, real_chart
-
-        caption, _, rows = plot.stored("real_surfaces")
-        return real_chart.draw_rows(rows, caption)
-    paths = [path for path in sorted(SCANS_FOLDER.glob("*.*")) if options.scan in path.stem]
-    if not paths:
-        sys.exit(f"real: {NO_SCANS}")
+    paths = scan_files(options.scan)
     with blender.quiet():
         scans = [Scan(path) for path in paths]
     if options.only != "automatic":
@@ -348,10 +333,6 @@ def main():
     if options.only != "fixed":
         rows = {scan.name: automatic_row(scan, options.points) for scan in scans}
         automatic_table(rows)
-    if options.chart and options.only is None:
-        from .real_chart import draw
-
-        draw(scores, seconds, np.mean([[row[10], row[9]] for row in rows.values()], axis=0))
     print(f"{options.points} points of each scan; {machine('bpy', 'numpy', 'scipy')}.")
 
 

@@ -4,8 +4,7 @@
 
 `python -m benchmarks.stability [--seeds N]`, from the root of a checkout. One circumstance after the other is
 led from harmless to hopeless on exact surfaces, with every method. The command prints Markdown and writes
-build/charts/stability.png with four of the sweeps, and stability.csv with all. With
---redraw it draws docs/charts/stability.csv again, which takes seconds. Lengths are in mm.
+build/charts/stability.png with four of the sweeps, and stability.csv with all. Lengths are in mm.
 
 A warning or a refusal is due wherever
 
@@ -16,8 +15,8 @@ A warning or a refusal is due wherever
 Where all is harmless and no warning is due, at most 5 % of the cases may have one. The stated uncertainty may
 not be too large either: the median of mean height_std over mean |dz| should be at most 2.
 
-The first table, the only one with `--untold`, is about what no contact can show, whatever the method, and
-about measured normals that are turned: how often a warning was due, and how often "bayes" gave one.
+The first table is about what no contact can show, whatever the method, and about measured normals that are
+turned: how often a warning was due, and how often "bayes" gave one.
 """
 
 import argparse
@@ -27,6 +26,8 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from core import METHODS, Contour, SamplingPlane, reconstruct, track
 from tests import surfaces
@@ -403,9 +404,9 @@ def rule_table(results):
         "For each method the cases where a warning or a refusal is due (all refusals count) and those where"
     )
     print(
-        "it was not given; the harmless cases, and the share of them that were warned of; and the median of "
-        "mean height_std over mean |dz|.\n"
+        "it was not given; the harmless cases, and the share of them that were warned of; and the median of"
     )
+    print("mean height_std over mean |dz|.\n")
     rows = []
     for method in METHODS:
         of = [(key, found[method]) for key, found in results.items()]
@@ -453,18 +454,8 @@ def untold_table(results):
     table(["change", "value", "cases", "needed", "needed but missing", "warned", "error", "stated"], rows)
 
 
-HEAD = [
-    "sweep",
-    "value",
-    "method",
-    "cases",
-    "error",
-    "height_std",
-    "condition",
-    "warned",
-    "refused",
-    "not given",
-]
+HEAD = ["sweep", "value", "method", "cases", "error", "height_std", "condition", "warned", "refused"]
+HEAD += ["not given"]
 
 
 def rows_of(results):
@@ -498,36 +489,31 @@ LOOKS = {  # color, line, letter
 # The sweeps in the picture; its table has all.
 SHOWN = ("degrees between planes", "noise, of the extent", "outliers, of the contacts", "one curve cut to")
 ERRORS, CONDITIONS = (2e-5, 20.0), (10.0, 1e8)
-HEIGHT = 6.2  # Of the picture, in inches.
+ORANGE, DARK, HARMLESS = (0.95, 0.65, 0.1), (0.15, 0.15, 0.15), "#e4eee4"
 
 
 def draw(rows, caption):
     """Draws build/charts/stability.png, with a panel for each sweep of SHOWN, and writes stability.csv."""
-    sweeps = [sweep for sweep in SWEEPS if sweep.title in SHOWN]
-    figure = plot.plt.figure(figsize=(8.6, HEIGHT))
-    figure.suptitle(
-        "Where reconstructions fail, and whether they say so",
-        fontsize=12,
-        weight="bold",
-        y=1.0 - 0.16 / HEIGHT,
-    )
-    grid = figure.add_gridspec(
-        2,
-        3,
-        left=0.08,
-        right=0.99,
-        top=1.0 - 0.67 / HEIGHT,
-        bottom=0.27 / HEIGHT,
-        hspace=0.45,
-        wspace=0.2,
-        width_ratios=[1.0, 1.0, 0.8],
-    )
-    for number, sweep in enumerate(sweeps):
-        cell = grid[divmod(number, 2)].subgridspec(3, 1, height_ratios=(3, 1.2, 1.4), hspace=0.08)
-        axes = [figure.add_subplot(part) for part in cell]
-        of = {m: [row for row in rows if (row[0], row[2]) == (sweep.title, m)] for m in METHODS}
+    figure = plot.plt.figure(figsize=(8.6, 6.2), layout="constrained")
+    figure.suptitle("Where reconstructions fail, and whether they say so", fontsize=12, weight="bold")
+    legend, panels = figure.subfigures(2, 1, height_ratios=(0.08, 1.0))
+    for number, (part, title) in enumerate(zip(panels.subfigures(2, 2).flat, SHOWN, strict=True)):
+        (sweep,) = (sweep for sweep in SWEEPS if sweep.title == title)
+        axes = part.subplots(3, 1, height_ratios=(3, 1.2, 1.4))
+        of = {m: [row for row in rows if (row[0], row[2]) == (title, m)] for m in METHODS}
         panel(axes, sweep, of, number % 2 == 0)
-    key(figure.add_subplot(grid[0, 2]))
+    handles = [
+        Line2D([], [], color=color, ls=line, label=f"{letter}: {method}")
+        for method, (color, line, letter) in LOOKS.items()
+    ]
+    handles.append(Line2D([], [], color=plot.BLUE, ls="", marker=".", label="bayes: mean height_std"))
+    shares = (
+        (ORANGE, "share with a warning"),
+        (DARK, "share refused"),
+        (HARMLESS, "harmless: no warning needed"),
+    )
+    handles += [Patch(color=color, label=label) for color, label in shares]
+    legend.legend(handles=handles, loc="center", ncols=4, fontsize=plot.LABEL_SIZE)
     plot.save(figure, "stability", caption, HEAD, rows)
 
 
@@ -545,11 +531,8 @@ def panel(axes, sweep, of, first):
     errors.set(yscale="log", ylim=ERRORS, yticks=[1e-4, 1e-2, 1])
     conditions.set(yscale="log", ylim=CONDITIONS, yticks=[1e2, 1e6])
     warned, refused = (np.array([[r[i] for r in rows] for rows in of.values()]) for i in (7, 8))
-    white, orange, black = np.ones(3), np.array([0.95, 0.65, 0.1]), np.array([0.15, 0.15, 0.15])
-    well = 1.0 - warned - refused
-    shares.imshow(
-        well[..., None] * white + warned[..., None] * orange + refused[..., None] * black, aspect="auto"
-    )
+    mixture = np.stack([1.0 - warned - refused, warned, refused], axis=-1) @ [(1.0, 1.0, 1.0), ORANGE, DARK]
+    shares.imshow(mixture, aspect="auto")
     shares.set_yticks(range(len(METHODS)), [LOOKS[m][2] for m in METHODS], fontsize=6)
     shares.set_xticks(
         places, [f"{v:g}" for v in sweep.values], fontsize=6, rotation=45 if len(places) > 8 else 0
@@ -557,7 +540,7 @@ def panel(axes, sweep, of, first):
     shares.grid(False)
     for number, value in enumerate(sweep.values):
         if value in sweep.benign:
-            errors.axvspan(number - 0.5, number + 0.5, color="#eef4ee", zorder=0)
+            errors.axvspan(number - 0.5, number + 0.5, color=HARMLESS, zorder=0)
     for part in (errors, conditions):
         part.set_xlim(-0.5, len(places) - 0.5)
         part.set_xticks([])
@@ -568,41 +551,13 @@ def panel(axes, sweep, of, first):
         conditions.set_ylabel("condition", fontsize=7)
 
 
-def key(axes):
-    axes.axis("off")
-    lines = [
-        *((line, color, f"{letter}  {method}") for method, (color, line, letter) in LOOKS.items()),
-        (".", plot.BLUE, "bayes: mean height_std"),
-        ("s", (0.95, 0.65, 0.1), "share with a warning"),
-        ("s", (0.15, 0.15, 0.15), "share refused"),
-        ("s", "#dce8dc", "harmless: no warning needed"),
-    ]
-    for number, (look, color, text) in enumerate(lines):
-        y = 0.95 - 0.125 * number
-        axes.plot(
-            [0.0, 0.1] if look in ("-", "--", "-.", ":") else [0.05],
-            [y] * (2 if look[0] in "-:" else 1),
-            look,
-            color=color,
-        )
-        axes.text(0.15, y, text, va="center", fontsize=8)
-    axes.set(xlim=(0, 1), ylim=(0, 1))
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=SEEDS, help="of the noise (%(default)s)")
-    parser.add_argument("--untold", action="store_true", help="only the first table")
-    parser.add_argument("--redraw", action="store_true", help="draw docs/charts/stability.csv again")
     options = parser.parse_args()
-    if options.redraw:
-        caption, _, rows = plot.stored("stability")
-        draw(rows, caption)
-        return
     keys = [
         Key(number, value, surface, seed)
         for number, sweep in enumerate(ALL)
-        if number >= len(SWEEPS) or not options.untold
         for value in sweep.values
         for surface in sweep.surfaces(value)
         for seed in range(options.seeds)
@@ -611,17 +566,17 @@ def main():
         found = dict(zip(keys, pool.map(outcomes, keys, chunksize=8), strict=True))
     results = {key: of for key, of in found.items() if key.sweep < len(SWEEPS)}
     untold_table(found)
-    if options.untold:
-        return
     rule_table(results)
+    used = machine("numpy", "scipy", "bpy")
     caption = (
         "Medians over ten exact surfaces (quadrics and quartics near the special points) and "
         f"{options.seeds} seeds. All else is harmless: planes 60 degrees apart, {STEPS} steps to a "
         f"side, noise of {NOISE:g} "
         "mm, radii L of 12 to 15 mm. Error: mean |dz| over the domain. Below it are the condition number and "
-        f"the shares of the touches with a warning and of the refused. On {machine('numpy', 'scipy', 'bpy')}."
+        f"the shares of the touches with a warning and of the refused. On {used}."
     )
     draw(rows_of(results), caption)
+    print(f"Errors are in % of the radius; {used}.")
 
 
 if __name__ == "__main__":

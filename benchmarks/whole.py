@@ -4,12 +4,25 @@
 
 import numpy as np
 
+import core
 from core.atlas.join import blend_heights, charts_of, refit
 from core.atlas.object_atlas import Atlas, joined_surface
 from core.steps import result_of
 
 NOISE = 0.0005
 EDGE = 0.008  # The length of an edge of the mesh; those of Poisson at depth 8 are half as long.
+
+
+def touched_all_over(thing, point, normal, tolerance, **options):
+    """(atlas, explorations, number of touches made) of core.touch_all_over, from a point of an object on."""
+    steps = core.touch_all_over(thing, point, normal, tolerance=tolerance, noise=NOISE, **options)
+    found, done = [], 0
+    try:
+        while True:
+            progress = next(steps)
+            found, done = found + list(progress.found), progress.done
+    except StopIteration as end:
+        return end.value, found, done
 
 
 def put_together(found, tolerance):

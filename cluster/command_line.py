@@ -8,14 +8,13 @@ import signal
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from importlib.util import find_spec
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from .data_set import manifest
 from .data_set.folder import DataSet
-from .data_set.options import Length, Options
-from .data_set.whole_options import WholeOptions
+from .data_set.options import Length, Options, WholeOptions
 from .engine import Engine, EngineError, connected
 from .extension import core
 from .input_files import KINDS, files_of
@@ -25,21 +24,26 @@ from .run import Run, StoppedError, summed_up
 WRONG_WORDS, STOPPED, WITH_ERRORS, INTERRUPTED = 2, 1, 3, 130  # The exit codes.
 
 
+def _length(text: str) -> str:
+    try:
+        return str(Length.of(text))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+LENGTH: dict[str, Any] = {"type": _length, "metavar": "LENGTH"}
+
+
 def main(words: Sequence[str] | None = None) -> int:
     """Makes a data set, and returns the exit code."""
-    parser = _parser()
-    given = parser.parse_args(words)
-    if given.dashboard and find_spec("bokeh") is None:
-        parser.error("--dashboard: expected bokeh, which draws it: install bokeh")
+    given = _parser().parse_args(words)
     try:
-        options = _whole_options(given) if given.command == "whole" else _options(given)
+        options = _options(given)
         data_set, files = DataSet(given.output, options.parts), files_of(given.objects)
         manifest.begun(data_set, options)  # Nothing is written to the folder of another data set.
         with data_set.claimed():
             run = Run(data_set, options, files)
-            with _interruptible(), connected(given.scheduler, given.workers, given.dashboard) as client:
-                if given.dashboard:
-                    print(f"Dashboard: {client.dashboard_link}", file=sys.stderr)
+            with _interruptible(), connected(given.scheduler, given.workers) as client:
                 if not client.scheduler_info(n_workers=1)["workers"]:
                     print("The scheduler has no workers yet: waiting for them", file=sys.stderr)
                 run.work(Engine(client, given.limit))
@@ -71,24 +75,12 @@ def _interruptible() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
-def _options(given: argparse.Namespace) -> Options:
-    azimuths = given.azimuths or [180.0 * i / given.planes for i in range(given.planes)]
-    names = ("extent", "step", "noise", "tolerance")
-    lengths: dict[str, Any] = {name: vars(given)[name] and str(vars(given)[name]) for name in names}
-    return Options(
-        azimuths=tuple(azimuths),
-        tilts=tuple(given.tilts or [0.0] * len(azimuths)),
-        **lengths,
-        **{
-            name: vars(given)[name]
-            for name in ("touches", "block", "seed", "method", "degree", "weight", "solver")
-        },
-    )
-
-
-def _whole_options(given: argparse.Namespace) -> WholeOptions:
-    tolerance = given.tolerance and str(given.tolerance)
-    return WholeOptions(given.seed, str(given.noise), tolerance, given.most)
+def _options(given: argparse.Namespace) -> Options | WholeOptions:
+    if given.command == "touch":
+        given.azimuths = given.azimuths or [180.0 * i / given.planes for i in range(given.planes)]
+        given.tilts = given.tilts or [0.0] * len(given.azimuths)
+    kind: Any = Options if given.command == "touch" else WholeOptions
+    return kind(**{field.name: getattr(given, field.name) for field in fields(kind)})
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -108,41 +100,33 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_work(add: Any) -> None:
-    """Adds the options of what to touch, and on which workers."""
+    """Adds the options of both commands: what to touch, with which noise, and on which workers."""
     help = f"{', '.join(KINDS)} files, folders of them, or .txt lists of these"
     add("objects", nargs="+", type=Path, metavar="OBJECT", help=help)
     add("--output", type=Path, required=True, metavar="FOLDER", help="folder of the data set, new or begun")
     add("--scheduler", metavar="ADDRESS", help="address of a Dask scheduler that has workers")
     help = "processes on this machine, if no scheduler is given (%(default)s)"
     add("--workers", type=_count, default=os.cpu_count(), metavar="COUNT", help=help)
-    help = "address to show Dask's dashboard at, such as :8787; it needs bokeh"
-    add("--dashboard", metavar="ADDRESS", help=help)
     help = "seconds that a block may take before it is ended (%(default)s)"
     add("--limit", type=_positive, default=600.0, metavar="SECONDS", help=help)
+    add("--seed", type=int, default=0, help="seed of places and noise (%(default)s)")
+    add("--noise", **LENGTH, default="0", help="standard deviation of the sensor (0)")
 
 
 def _add_touches(add: Any) -> None:
     """Adds the options of how to touch, which are all in the manifest."""
     add("--touches", type=_count, default=1000, help="touches per object (%(default)s)")
     add("--block", type=_count, default=500, help="touches per task and file (%(default)s)")
-    add("--seed", type=int, default=0, help="seed of places and noise (%(default)s)")
-    add(
-        "--planes",
-        type=int,
-        choices=range(3, 7),
-        default=3,
-        help="number of evenly spaced sampling planes (3)",
-    )
+    help = "number of evenly spaced sampling planes (3)"
+    add("--planes", type=int, choices=range(3, 7), default=3, help=help)
     degrees = {"type": float, "nargs": "+", "metavar": "DEGREES"}
     add("--azimuths", **degrees, help="directions of planes that are not evenly spaced")
     add("--tilts", **degrees, help="tilts of the planes, one each (0)")
-    length = {"type": _length, "metavar": "LENGTH"}
     help = "length of each half curve, in the object's unit or as 6%% of its size (as far as can be trusted)"
-    add("--extent", **length, help=help)
-    add("--step", **length, help="distance between contacts (such that more would add little)")
-    add("--noise", **length, default=Length(0.0, False), help="standard deviation of the sensor (0)")
+    add("--extent", **LENGTH, help=help)
+    add("--step", **LENGTH, help="distance between contacts (such that more would add little)")
     help = "add planes until heights are accurate to this (no planes are added)"
-    add("--tolerance", **length, help=help)
+    add("--tolerance", **LENGTH, help=help)
     add("--method", choices=core.METHODS, default="bayes", help="how to fit (%(default)s)")
     add("--degree", choices=["auto", *"23456"], default="auto", help="degree of the polynomial (%(default)s)")
     add("--weight", type=_positive, help="lambda L^2 of tagc (1000) and quadratic-variation (1e5)")
@@ -151,19 +135,9 @@ def _add_touches(add: Any) -> None:
 
 def _add_whole(add: Any) -> None:
     """Adds the options of how to touch all over, which are all in the manifest."""
-    add("--seed", type=int, default=0, help="seed of the first place and the noise (%(default)s)")
-    help = "standard deviation of the sensor (0)"
-    add("--noise", type=_length, metavar="LENGTH", default=Length(0.0, False), help=help)
     help = "standard deviation to reach for each patch's height (0.2%% of the object's size)"
-    add("--tolerance", type=_length, metavar="LENGTH", help=help)
+    add("--tolerance", **LENGTH, help=help)
     add("--most", type=_count, default=1000, metavar="COUNT", help="touches per object at most (%(default)s)")
-
-
-def _length(text: str) -> Length:
-    try:
-        return Length.of(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def _count(text: str) -> int:

@@ -3,12 +3,10 @@
 """Dask: workers here or elsewhere, who carry out orders; what is lost with one of them is ordered again."""
 
 import logging
-import math
 from collections.abc import Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
-from itertools import islice
-from time import monotonic, sleep
+from time import sleep
 from typing import Any, NamedTuple
 from uuid import uuid4
 
@@ -33,9 +31,6 @@ CALM = {
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "5s",
 }
-AHEAD = 3  # For each thread of a worker, this many orders are out at once.
-LEAST_AHEAD = 16
-LOOK_EVERY = 5.0  # The threads of all workers are counted every this many seconds.
 GONE = "The worker was lost with it again and again"
 CONNECT = 60.0  # A scheduler that was restarted may come back within this many seconds.
 
@@ -62,7 +57,7 @@ class Outcome(NamedTuple):
 
 
 @contextmanager
-def connected(scheduler: str | None, workers: int, dashboard: str | None) -> Iterator[Client]:
+def connected(scheduler: str | None, workers: int) -> Iterator[Client]:
     """A client of the scheduler at an address, or of a new one with `workers` workers on this machine."""
     if scheduler is None:
         with (
@@ -74,7 +69,7 @@ def connected(scheduler: str | None, workers: int, dashboard: str | None) -> Ite
                 memory_limit=0,
                 silence_logs=logging.ERROR,
                 preload=[PRELOAD],
-                dashboard_address=dashboard or "127.0.0.1:0",
+                dashboard_address="127.0.0.1:0",
             ) as cluster,
             Client(cluster) as client,
         ):
@@ -89,16 +84,14 @@ def connected(scheduler: str | None, workers: int, dashboard: str | None) -> Ite
 
 
 class Engine:
-    """Gives orders to the workers of a client's scheduler, a few at a time.
+    """Gives orders to the workers of a client's scheduler.
 
     limit : seconds that an order may take
-    threads : number of threads of all workers, as of a few seconds ago
     """
 
     def __init__(self, client: Client, limit: float) -> None:
         self.client, self.limit = client, limit
         self._run, self._number = uuid4().hex, 0
-        self._looked, self.threads = -math.inf, 0
 
     def performed(self, orders: Iterable[Order]) -> Iterator[Outcome]:
         """Yields each outcome as it comes.
@@ -106,59 +99,32 @@ class Engine:
         What is lost with a worker, or with a scheduler that is restarted, is ordered again. Raises
         EngineError if the scheduler does not come back.
         """
-        waiting = iter(orders)
-        out: dict[Future[Any], Order] = {}
-        running = as_completed()
-        while True:
-            for order in islice(waiting, self._room() - len(out)):
-                self._submit(order, out, running)
-            if not out:
-                return
-            batch = {future: out.pop(future) for future in running.next_batch()}
-            outcomes = self._outcomes(batch)
-            for future, order in batch.items():
-                if future in outcomes:
-                    yield Outcome(order, *outcomes[future])
-                else:
-                    self._submit(order, out, running)
+        out = {self._submitted(order): order for order in orders}
+        running = as_completed(list(out))
+        for future in running:
+            order = out.pop(future)
+            if (outcome := _outcome(future, order)) is not None:
+                yield outcome
+            else:
+                again = self._submitted(order)
+                out[again] = order
+                running.add(again)
 
-    def _submit(self, order: Order, out: dict[Future[Any], Order], running: as_completed) -> None:
+    @property
+    def threads(self) -> int:
+        """The number of threads of all workers, 0 while the scheduler does not answer."""
+        with suppress(OSError, TimeoutError):
+            workers = self.client.scheduler_info(n_workers=-1)["workers"].values()
+            return sum(worker["nthreads"] for worker in workers)
+        return 0
+
+    def _submitted(self, order: Order) -> Future[Any]:
         self._require_scheduler()
         self._number += 1
         # The scheduler groups tasks by the first part, and its logs show the label.
         key = (f"{order.name}-{self._run}", order.label, self._number)
         words = (order.label, self.limit, order.name, *order.arguments)
-        future = self.client.submit(task.perform, *words, key=key, pure=False)
-        out[future] = order
-        running.add(future)
-
-    def _outcomes(self, orders: dict[Future[Any], Order]) -> dict[Future[Any], tuple[str, Any, list[str]]]:
-        """How orders went, by their futures; those that are lost are left out."""
-        found: dict[Future[Any], tuple[str, Any, list[str]]] = {}
-        finished = [future for future in orders if future.status == "finished"]
-        with suppress(CancelledError, OSError, TimeoutError):
-            found |= zip(finished, self.client.gather(finished), strict=True)
-        for future, order in orders.items():
-            if future.status == "error":
-                error = future.exception()
-                if not isinstance(error, KilledWorker):
-                    words = " ".join(str(error).split()).partition(". ")[0]
-                    raise EngineError(
-                        f"the scheduler or a worker cannot take orders ({words}): start them in the same "
-                        "environment, with this checkout on their PYTHONPATH"
-                    ) from error
-                found[future] = FAILED, GONE, [f"{order.label}: {GONE}"]
-        return found
-
-    def _room(self) -> int:
-        """The number of orders that may be out at once."""
-        if monotonic() - self._looked > LOOK_EVERY:
-            self._looked = monotonic()
-            self._require_scheduler()
-            with suppress(OSError, TimeoutError):
-                workers = self.client.scheduler_info(n_workers=-1)["workers"].values()
-                self.threads = sum(worker["nthreads"] for worker in workers)
-        return max(LEAST_AHEAD, AHEAD * self.threads)
+        return self.client.submit(task.perform, *words, key=key, pure=False)
 
     def _require_scheduler(self) -> None:
         """Waits for a scheduler that was restarted."""
@@ -166,3 +132,20 @@ class Engine:
             sleep(0.1)
         if self.client.status != "running":
             raise EngineError("the scheduler is gone: start it again, and then this command")
+
+
+def _outcome(future: Future[Any], order: Order) -> Outcome | None:
+    """How an order went, or None if it is lost. Raises EngineError if it cannot be taken."""
+    if future.status == "finished":
+        with suppress(CancelledError, OSError, TimeoutError):
+            return Outcome(order, *future.result())
+    if future.status != "error":
+        return None
+    error = future.exception()
+    if isinstance(error, KilledWorker):
+        return Outcome(order, FAILED, GONE, [f"{order.label}: {GONE}"])
+    words = " ".join(str(error).split()).partition(". ")[0]
+    raise EngineError(
+        f"the scheduler or a worker cannot take orders ({words}): start them in the same environment, with "
+        "this checkout on their PYTHONPATH"
+    ) from error

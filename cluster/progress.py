@@ -29,14 +29,14 @@ class Progress:
         """The number that is made a second."""
         return self.done / max(monotonic() - self.start, 1e-9)
 
-    def add(self, done: int, errors: int, workers: int) -> None:
+    def add(self, done: int, errors: int, engine: Any) -> None:
         """Notes that more are done, and prints a line such as "1,200 of 9,000 touches, 80 a second, ..."."""
         self.done, self.errors = self.done + done, self.errors + errors
         if monotonic() - self._said < SAY_EVERY and self.done < self.total:
             return
         self._said = monotonic()
         left = (self.total - self.done) / self.rate / 60.0 if self.done else 0.0
-        speed = f"{self.rate:.3g} a second on {_many(workers, 'worker')}, {left:.1f} min left"
+        speed = f"{self.rate:.3g} a second on {_many(engine.threads, 'worker')}, {left:.1f} min left"
         note(f"{self.done:,} of {self.total:,} {self.noun}, {speed}, {_many(self.errors, 'error')}")
 
 

@@ -11,8 +11,7 @@ from typing import Any
 from .data_set import manifest
 from .data_set.columns import COUNTS
 from .data_set.folder import DataSet, file_key
-from .data_set.options import Options
-from .data_set.whole_options import WholeOptions
+from .data_set.options import Options, WholeOptions
 from .engine import Engine, Order, Outcome
 from .input_files import printable
 from .progress import Progress, note
@@ -73,7 +72,7 @@ class Run:
                 note(f"{outcome.order.label}: {outcome.value}")
                 self.data_set.write_errors(facts, block, numbers, outcome.value)
                 errors = len(numbers)
-            self.progress.add(len(numbers), errors, engine.threads)
+            self.progress.add(len(numbers), errors, engine)
 
     def _survey(self, engine: Engine, done: set[str]) -> list[dict[str, Any]]:
         """The facts of all objects that are to be touched, each once, which also go into the manifest."""

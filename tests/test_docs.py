@@ -5,6 +5,7 @@
 import re
 import shutil
 import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -82,6 +83,18 @@ def test_every_picture_is_drawn_by_a_command_or_taken_of_a_window_and_stands_on_
 def test_every_command_of_a_figure_is_there():
     for run in figures.RUNS.values():
         assert (ROOT / f"{run.words.split()[0].replace('.', '/')}.py").is_file(), run.words
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "run", [run for run in figures.RUNS.values() if " " in run.words], ids=lambda run: run.words
+)
+def test_a_command_of_a_figure_has_no_word_that_it_does_not_know(run):
+    """So that `make figures` does not fail after hours: only the word that is added is unknown."""
+    pytest.importorskip("matplotlib", reason="needs what benchmarks draw with: make chart installs it")
+    command = [sys.executable, "-m", *run.words.split(), "--unknown"]
+    found = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert found.stderr.rstrip().endswith("error: unrecognized arguments: --unknown"), found.stderr
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

@@ -2,9 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a small run of benchmarks.accuracy finds is what the README and the first table of the pages have."""
 
+import csv
+import shutil
+import subprocess
+
 import numpy as np
 import pytest
 
+import benchmarks
 from benchmarks import accuracy
 from tools import figures
 
@@ -44,3 +49,47 @@ def test_the_errors_on_random_shapes_are_those_of_the_readme_within_their_noise(
     covered = 100.0 * means(accuracy.BAYES, "covered")
     told = float(cell("planes | median", "all", "covered").split()[0])
     assert told == pytest.approx(covered.mean(), abs=3.0 * covered.std() / np.sqrt(SHAPES))
+
+
+def test_a_benchmark_without_scans_says_where_they_are_from(tmp_path, monkeypatch):
+    monkeypatch.setattr(benchmarks, "SCANS_FOLDER", tmp_path)
+    with pytest.raises(
+        SystemExit, match=r"benchmarks/SCANS.md lists into one folder, and name it by TACTILE"
+    ):
+        benchmarks.scan_files()
+    for name in ("pear.ply", "cad_block.stl"):
+        (tmp_path / name).touch()
+    assert [path.name for path in benchmarks.scan_files("cad")] == ["cad_block.stl"]
+
+
+def test_figures_that_are_kept_do_not_make_the_code_a_later_one(tmp_path, monkeypatch):
+    if shutil.which("git") is None:
+        pytest.skip("needs git")
+
+    def git(*words):
+        author = ("-c", "user.name=a", "-c", "user.email=a@b")
+        subprocess.run(["git", *author, *words], cwd=tmp_path, check=True, capture_output=True)
+
+    (tmp_path / "docs").mkdir()
+    for name in ("code.py", "docs/figure.txt"):
+        (tmp_path / name).write_text("old")
+    git("init")
+    git("add", "--all")
+    git("commit", "--message", "old")
+    monkeypatch.setattr(benchmarks, "ROOT", tmp_path)
+    (tmp_path / "docs" / "figure.txt").write_text("new")
+    head = benchmarks.commit()
+    assert len(head) >= 7 and "later" not in head
+    (tmp_path / "code.py").write_text("new")
+    assert benchmarks.commit() == f"later than {head}"
+
+
+def test_nothing_in_the_chart_is_nearer_with_the_same_curves_and_little_is_faster():
+    text = (figures.DOCS / "charts" / "speed_accuracy.csv").read_text(encoding="utf-8")
+    rows = list(csv.DictReader(text.splitlines()[1:]))
+    for noise in {row["noise mm"] for row in rows}:
+        fits = [r for r in rows if r["noise mm"] == noise and "(hollow)" not in r["meaning"]]
+        (default,) = (row for row in fits if row["method"] == "auto")
+        best = min(float(row["um median"]) for row in fits if row["um median"] != "nan")
+        assert float(default["um median"]) == best
+        assert float(default["ms median"]) - min(float(row["ms median"]) for row in fits) < 1.0

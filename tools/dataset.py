@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A small data set of touches, made by two workers in a minute: `python -m tools.dataset`.
 
-It touches the scans of ../shared/data, or Suzanne and simple shapes if there are no scans, tabulates what was
-found, and draws the contacts, colored by how far the patches are off the mesh.
+It touches the scans in the folder that TACTILE_SCANS names, or Suzanne and simple shapes without these. Then
+it tabulates what was found, and draws the contacts, colored by how far the patches are off the mesh.
 """
 
 import argparse
+import os
 import shutil
 import subprocess
 import sys
@@ -21,7 +22,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot
 
 ROOT = Path(__file__).resolve().parents[1]
-SCANS = ROOT.parent / "shared" / "data" / "meshes"
+SCANS = Path(os.environ.get("TACTILE_SCANS", ROOT.parent / "shared" / "data" / "meshes"))
 BUILD = ROOT / "build"
 WORDS = ("--touches", "200", "--block", "100", "--noise", "0.05%", "--workers", "2")
 TICKS = (0.1, 0.3, 1.0, 3.0, 10.0)  # In ‰ of an object's size.
@@ -34,17 +35,8 @@ def main():
     options = parser.parse_args()
     objects = options.objects or (SCANS if SCANS.is_dir() else shapes(BUILD / "shapes"))
     shutil.rmtree(options.output, ignore_errors=True)
-    command = [
-        sys.executable,
-        "-m",
-        "cluster",
-        "touch",
-        str(objects),
-        *WORDS,
-        "--output",
-        str(options.output),
-    ]
-    code = subprocess.run(command, cwd=ROOT).returncode
+    words = ("touch", str(objects), *WORDS, "--output", str(options.output))
+    code = subprocess.run([sys.executable, "-m", "cluster", *words], cwd=ROOT).returncode
     if code not in (0, 3):  # The code is 3 if some objects could not be touched.
         sys.exit(code)
     stored = pq.read_table(options.output / "objects.parquet").to_pylist()

@@ -54,12 +54,12 @@ RUNS = {
     "film": Run(f"tools.film --zip {ZIP}", "", {"film.webp": None}),
     "accuracy": Run("benchmarks.accuracy", "Exact surfaces and random shapes"),
     "chart": Run("benchmarks.chart", "", _chart("speed_accuracy")),
-    "real": Run("benchmarks.real --points 100 --chart", "Scans of real objects", _chart("real_surfaces")),
+    "real": Run("benchmarks.real", "Scans of real objects"),
     "curvatures": Run("benchmarks.curvatures", "How often deviations hold"),
     "facets": Run(f"benchmarks.facets {ZIP}", "Facets"),
     "stability": Run("benchmarks.stability", "Limits of the methods", _chart("stability")),
     "shapes": Run("benchmarks.atlas --shapes --coarsest 0.002", "Made objects, touched all over"),
-    "atlas": Run("benchmarks.atlas --coarsest 0.002", "Scans, touched all over", _chart("atlas")),
+    "atlas": Run("benchmarks.atlas --coarsest 0.002", "Scans, touched all over"),
     "field": Run("benchmarks.field $YCB", "Objects of a public set, touched all over"),
     "add_menu": Run(
         f"benchmarks.add_menu {ZIP}", "Blender's Add menu", {"add_menu.jpg": "charts/add_menu.jpg"}
@@ -71,11 +71,7 @@ RUNS = {
     "orientation": Run("benchmarks.measured --orientation", "Sides of strokes without normals"),
     "palpation": Run("benchmarks.robot $PALPATION", "The contacts of a real robot"),
     "live": Run(f"benchmarks.live {ZIP}", "Live updates in Blender"),
-    "paper": Run(
-        f"benchmarks.paper {ZIP}",
-        "The paper's experiments",
-        {"paper_figures_3_4.jpg": "paper/figures_3_4.jpg", "paper_table_1.jpg": "paper/table_1.jpg"},
-    ),
+    "paper": Run(f"benchmarks.paper {ZIP}", "The paper's experiments"),
 }
 # Pictures of a window are taken by tests/gui/run.sh in build/gui, and one picture is drawn by hand.
 WINDOW = ("pick", "probe", "deviation", "verify", "stability", "lost", "found", "whole_object")
@@ -85,7 +81,7 @@ FIGURE = re.compile(r'(<!-- figure (\w+) "([^"]*)" "([^"]*)" (\d+) -->)[^<]*(<!-
 HEAD = """# Figures
 
 This appendix has all tables that the benchmarks print. `make figures` makes it, and fills the tables of the
-other pages from it. The line below a table names the machine, versions and commit.
+other pages from it. A line of each command names the machine, versions and commit.
 A later commit may give other figures. Times are comparable within a table only.
 """
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The columns of a data set: types, units and meanings, which are also in the metadata of each file."""
 
-from typing import Any
-
 import pyarrow as pa
 
 NUMBER, NUMBERS, WORD = pa.float64(), pa.list_(pa.float64()), pa.string()
@@ -109,12 +107,6 @@ SCHEMAS = {
     "touches": (TOUCH_SCHEMA, _schema(OBJECTS)),
     "surfaces": (_schema(SURFACES), _schema((*OBJECTS, *FOUND))),
 }
-
-
-def table(rows: list[dict[str, Any]], schema: pa.Schema, metadata: dict[str, str] | None = None) -> pa.Table:
-    """The rows as a table; values that a row does not have are null."""
-    arrays = [pa.array([row.get(field.name) for row in rows], field.type) for field in schema]
-    return pa.Table.from_arrays(arrays, schema=schema.with_metadata(metadata))
 
 
 def kind_of(status: str) -> str:

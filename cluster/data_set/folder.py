@@ -20,7 +20,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ..extension import addon
-from .columns import REPEATED, SCHEMAS, TOUCH_SCHEMA, table
+from .columns import REPEATED, SCHEMAS, TOUCH_SCHEMA
 
 whole_file = addon("files.whole_file")
 SUMMARY = "summary"  # The key of a file's summary in its metadata.
@@ -127,7 +127,7 @@ class DataSet:
     def write_objects(self, rows: Sequence[dict[str, Any]]) -> None:
         """Writes the file of objects, which is the last one."""
         self._tidy()
-        _write(self.objects, table(list(rows), SCHEMAS[self.parts.name][1]))
+        _write(self.objects, pa.Table.from_pylist(list(rows), SCHEMAS[self.parts.name][1]))
 
 
 def write_block(
@@ -139,7 +139,8 @@ def write_block(
     """
     message = rows[0]["message"] if "error" in counts else None
     summary = {"facts": facts, "counts": counts, "seconds": seconds, "message": message}
-    _write(path, table(rows, SCHEMAS[path.parent.name][0], {SUMMARY: json.dumps(summary)}))
+    schema = SCHEMAS[path.parent.name][0].with_metadata({SUMMARY: json.dumps(summary)})
+    _write(path, pa.Table.from_pylist(rows, schema))
     return summary
 
 

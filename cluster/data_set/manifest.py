@@ -8,8 +8,7 @@ from typing import Any
 
 from .. import extension
 from .folder import DataSet, whole_file
-from .options import Options
-from .whole_options import WholeOptions
+from .options import Options, WholeOptions
 
 FORMAT = 2
 PACKAGES = ("bpy", "numpy", "scipy")

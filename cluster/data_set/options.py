@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How objects are touched: the options of the command, checked, and their lengths on one object."""
+"""How objects are touched, or touched all over: options, checked, and their lengths on one object."""
 
 import math
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -42,8 +42,12 @@ class Length:
         return f"{100.0 * self.value:.12g}%" if self.is_share else f"{self.value:.12g}"
 
 
-class Lengths:
-    """Options of which some are lengths, given as words."""
+class _Common:
+    """What options of both commands have: plain values, of which lengths are words, and a seed."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The options as plain values."""
+        return asdict(self)  # type: ignore[call-overload]
 
     def length(self, name: str, size: float) -> float | None:
         """One of the lengths on an object of this size, or None if the surface chooses it."""
@@ -51,7 +55,7 @@ class Lengths:
         return None if words is None else Length.of(words).on(size)
 
 
-def require_seed(seed: int) -> None:
+def _require_seed(seed: int) -> None:
     """Raises ValueError, with a sentence, for a seed that the column of seeds does not hold."""
     if not 0 <= seed <= LARGEST_SEED:
         bound = "of 0 or more" if seed < 0 else f"up to {LARGEST_SEED}"
@@ -59,7 +63,7 @@ def require_seed(seed: int) -> None:
 
 
 @dataclass(frozen=True)
-class Options(Lengths):
+class Options(_Common):
     """Everything besides the object on which rows depend; lengths are words, see Length, None to be chosen.
 
     touches : number of touches of each object
@@ -71,8 +75,8 @@ class Options(Lengths):
     touches: int
     block: int
     seed: int
-    azimuths: tuple[float, ...]
-    tilts: tuple[float, ...]
+    azimuths: list[float]
+    tilts: list[float]
     extent: str | None
     step: str | None
     noise: str
@@ -86,7 +90,7 @@ class Options(Lengths):
 
     def __post_init__(self) -> None:
         """Raises ValueError, with a sentence, for options that no touch can have."""
-        require_seed(self.seed)
+        _require_seed(self.seed)
         for name in ("touches", "block"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name}: expected a number of 1 or more, got {getattr(self, name)}")
@@ -95,16 +99,6 @@ class Options(Lengths):
                 f"tilts: expected as many as there are planes, {len(self.azimuths)}, got {len(self.tilts)}"
             )
         self._rehearse()
-
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> "Options":
-        """The options that `to_dict` made `values` from, perhaps through JSON, which has no tuples."""
-        plain: dict[str, Any] = {field.name: values.get(field.name) for field in fields(cls)}
-        return cls(**plain | {name: tuple(plain[name]) for name in ("azimuths", "tilts")})
-
-    def to_dict(self) -> dict[str, Any]:
-        """The options as plain values."""
-        return asdict(self) | {"azimuths": list(self.azimuths), "tilts": list(self.tilts)}
 
     def planes(self) -> list[Any]:
         """The sampling planes."""
@@ -140,3 +134,36 @@ class Options(Lengths):
         axes = [plane.axes(up) for plane in self.planes()]
         contours = [core.Contour(np.outer(along, a[:, 0]), plane_normal=a[:, 2]) for a in axes]
         core.reconstruct(np.zeros(3), contours, outward=up, **self.fit())
+
+
+@dataclass(frozen=True)
+class WholeOptions(_Common):
+    """Everything besides the object on which surfaces depend; an object is one task and one row.
+
+    tolerance : mean deviation of the height to reach for each patch, a length as in Options, or None
+    most : largest number of touches of an object
+    """
+
+    seed: int
+    noise: str
+    tolerance: str | None
+    most: int
+
+    command, parts, touches = "whole", "surfaces", 1
+
+    def __post_init__(self) -> None:
+        """Raises ValueError, with a sentence, for options that no object can be touched with."""
+        _require_seed(self.seed)
+        if self.tolerance is None:
+            return
+        tolerance, noise = Length.of(self.tolerance), Length.of(self.noise)
+        if tolerance.is_share == noise.is_share and tolerance.value < noise.value:
+            raise ValueError(f"tolerance: expected the noise {noise} or more, got {tolerance}")
+
+    def blocks(self) -> range:
+        """The number of the only task."""
+        return range(1)
+
+    def numbers(self, block: int) -> range:
+        """The number of its only row."""
+        return range(1)

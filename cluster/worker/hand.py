@@ -24,8 +24,7 @@ import bpy
 from ..data_set import manifest
 from ..data_set.columns import FOUND, kind_of
 from ..data_set.folder import write_block
-from ..data_set.options import Options
-from ..data_set.whole_options import WholeOptions
+from ..data_set.options import Options, WholeOptions
 from . import objects, surfaces, touches
 from .process import DONE, FAILED, STOP
 
@@ -60,7 +59,7 @@ class Hand:
 
     def touch(self, facts: dict[str, Any], options: dict[str, Any], block: int, path: str) -> dict[str, Any]:
         """Touches an object, writes the rows of a block to the file `path`, and returns its summary."""
-        rows, seconds = touches.touched(self._object(facts), Options.from_dict(options), block)
+        rows, seconds = touches.touched(self._object(facts), Options(**options), block)
         return _written(path, rows, facts, seconds, Counter(kind_of(row["status"]) for row in rows))
 
     def whole(self, facts: dict[str, Any], options: dict[str, Any], block: int, path: str) -> dict[str, Any]:

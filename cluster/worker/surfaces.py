@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ..data_set.columns import FOUND
-from ..data_set.whole_options import WholeOptions
+from ..data_set.options import WholeOptions
 from ..extension import addon
 from .objects import Touchable
 

@@ -35,7 +35,7 @@ def cluster():
     """A client of a cluster of two workers."""
     from cluster.engine import connected
 
-    with connected(None, 2, None) as client:
+    with connected(None, 2) as client:
         yield client
 
 

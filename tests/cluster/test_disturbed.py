@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whatever happens in the middle: workers and schedulers lost, broken files, no room on the disk, Ctrl+C."""
 
+import json
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -70,9 +72,44 @@ def wait_for(true, seconds=60.0):
     assert true()
 
 
-def test_a_worker_killed_in_the_middle_costs_its_block(
-    command, cluster, objects, plain, tmp_path, in_the_middle
-):
+@pytest.fixture
+def completes(command, objects, plain, tmp_path):
+    """A function that runs the command to its end, and returns what it printed on standard error.
+
+    The rows are then those of a run that nothing has disturbed.
+    """
+
+    def run(**scheduler):
+        code, _, error = command(objects, *FEW, "--output", tmp_path, **scheduler)
+        assert code == 0, error
+        assert rows_of(tmp_path) == rows_of(plain) and nothing_is_aside(tmp_path)
+        return error
+
+    return run
+
+
+@pytest.fixture
+def options(plain):
+    """The options of that data set, as plain values."""
+    return json.loads((plain / "manifest.json").read_text())["options"]
+
+
+@pytest.fixture
+def hand(objects):
+    """A function that starts a process with Blender, which has found the facts of the pebble."""
+    from cluster.data_set import manifest
+    from cluster.worker.process import HandProcess
+
+    def start():
+        process = HandProcess()
+        how, (process.facts,) = process.ask(100.0, "survey", str(objects / "pebble.ply"), manifest.versions())
+        assert how == "done"
+        return process
+
+    return start
+
+
+def test_a_worker_killed_in_the_middle_costs_its_block(completes, cluster, tmp_path, in_the_middle):
     killed = []
 
     def kill():
@@ -81,30 +118,21 @@ def test_a_worker_killed_in_the_middle_costs_its_block(
         os.kill(pid, signal.SIGKILL)
 
     in_the_middle(tmp_path, kill)
-    code, *_ = command(objects, *FEW, "--output", tmp_path)
-    assert code == 0 and killed
-    assert rows_of(tmp_path) == rows_of(plain)
-    assert nothing_is_aside(tmp_path)
+    completes()
+    assert killed
     wait_for(lambda: not any(p.is_running() and p.status() != "zombie" for p in killed))  # Blender too
 
 
-def test_blender_killed_in_the_middle_is_tried_again_and_logged(
-    command, objects, plain, tmp_path, in_the_middle
-):
+def test_blender_killed_in_the_middle_is_tried_again_and_logged(completes, tmp_path, in_the_middle):
     in_the_middle(tmp_path, lambda: [hand.kill() for hand in hands()])
-    code, *_ = command(objects, *FEW, "--output", tmp_path)
-    assert code == 0
-    assert rows_of(tmp_path) == rows_of(plain)
+    completes()
     (trouble, *_) = [line for line in (tmp_path / "log.txt").read_text().splitlines() if "SIGKILL" in line]
     assert " block " in trouble and ".ply) block" in trouble
 
 
-def test_workers_that_somebody_restarts_do_not_end_the_run(
-    command, cluster, objects, plain, tmp_path, in_the_middle
-):
+def test_workers_that_somebody_restarts_do_not_end_the_run(completes, cluster, tmp_path, in_the_middle):
     in_the_middle(tmp_path, cluster.restart)
-    assert command(objects, *FEW, "--output", tmp_path)[0] == 0
-    assert rows_of(tmp_path) == rows_of(plain)
+    completes()
 
 
 def free_port():
@@ -142,7 +170,7 @@ def scheduler(port, path=ROOT, workers=1):
         end()
 
 
-def test_a_scheduler_that_is_started_again_goes_on(command, objects, plain, tmp_path, in_the_middle):
+def test_a_scheduler_that_is_started_again_goes_on(completes, tmp_path, in_the_middle):
     port = free_port()
     with ExitStack() as running:
         address, end = running.enter_context(scheduler(port))
@@ -152,8 +180,7 @@ def test_a_scheduler_that_is_started_again_goes_on(command, objects, plain, tmp_
             running.enter_context(scheduler(port))
 
         in_the_middle(tmp_path, restart)
-        assert command(objects, *FEW, "--output", tmp_path, scheduler=address)[0] == 0
-    assert rows_of(tmp_path) == rows_of(plain)
+        completes(scheduler=address)
 
 
 def test_no_scheduler_there_is_said(command, objects, tmp_path, monkeypatch):
@@ -238,32 +265,24 @@ def test_broken_and_empty_files_and_one_that_blender_dies_of_are_error_rows(comm
     assert code == 3 and "7 errors" not in output and output.startswith("8 objects")
 
 
-def test_a_process_that_takes_too_long_is_ended(objects, plain, tmp_path):
-    import json
+def test_a_process_that_takes_too_long_is_ended(hand, options, tmp_path):
+    from cluster.worker.process import LostError
 
-    from cluster.data_set import manifest
-    from cluster.worker.process import HandProcess, LostError
-
-    options = json.loads((plain / "manifest.json").read_text())["options"] | {"touches": 5000, "block": 5000}
-    survey = ("survey", str(objects / "pebble.ply"), manifest.versions())
-    hand = HandProcess()
-    _, (facts,) = hand.ask(100.0, *survey)
-    with pytest.raises(LostError) as busy:  # half a second is too short for 5000 touches
-        hand.ask(0.5, "touch", facts, options, 0, str(tmp_path / "block.parquet"))
-    assert str(busy.value).startswith("It took longer than the limit of 0.5 s\n")
-    assert "most recent call first" in str(busy.value)  # this says where the process was
-    assert hand.is_worn and not list(tmp_path.iterdir())
-    hand = HandProcess()
-    hand.ask(100.0, *survey)
-    os.kill(hand._process.pid, signal.SIGSTOP)  # a stopped process cannot run its watchdog either
+    busy = hand()
+    order = (busy.facts, options | {"touches": 5000, "block": 5000}, 0, str(tmp_path / "block.parquet"))
+    with pytest.raises(LostError) as ended:  # half a second is too short for 5000 touches
+        busy.ask(0.5, "touch", *order)
+    assert str(ended.value).startswith("It took longer than the limit of 0.5 s\n")
+    assert "most recent call first" in str(ended.value)  # this says where the process was
+    assert busy.is_worn and not list(tmp_path.iterdir())
+    stopped = hand()
+    os.kill(stopped._process.pid, signal.SIGSTOP)  # a stopped process cannot run its watchdog either
     with pytest.raises(LostError, match=r"It took longer than the limit of 0.1 s"):
-        hand.ask(0.1, *survey)
-    assert hand.is_worn
+        stopped.ask(0.1, "touch", *order)
+    assert stopped.is_worn
 
 
-def test_a_block_that_fails_twice_is_error_rows(cluster, objects, tmp_path, plain, monkeypatch):
-    import json
-
+def test_a_block_that_fails_twice_is_error_rows(cluster, objects, options, tmp_path):
     from cluster.data_set.folder import DataSet
     from cluster.data_set.options import Options
     from cluster.engine import Engine, Outcome
@@ -277,8 +296,7 @@ def test_a_block_that_fails_twice_is_error_rows(cluster, objects, tmp_path, plai
                 else:
                     yield from super().performed([order])
 
-    options = Options.from_dict(json.loads((plain / "manifest.json").read_text())["options"])
-    run = Run(DataSet(tmp_path), options, [str(objects / "pebble.ply")])
+    run = Run(DataSet(tmp_path), Options(**options), [str(objects / "pebble.ply")])
     run.work(Failing(cluster, 100.0))
     (row,) = summed_up(run.data_set)
     assert (row["touches"], row["error"], row["message"]) == (30, 10, "It hung")
@@ -300,7 +318,7 @@ def test_a_folder_that_takes_nothing_is_said_at_once(command, objects, tmp_path,
     assert error.startswith(f'cluster: cannot write to the folder "{folder}"') and error.endswith("another\n")
 
 
-def test_a_full_disk_ends_the_run_and_loses_nothing(command, objects, plain, tmp_path):
+def test_a_full_disk_ends_the_run_and_loses_nothing(completes, objects, plain, tmp_path):
     least = min(path.stat().st_size for path in blocks_of(plain))
     assert least > 15_000
 
@@ -311,8 +329,7 @@ def test_a_full_disk_ends_the_run_and_loses_nothing(command, objects, plain, tmp
     assert run.returncode == 1, error
     assert "make room there, or choose another place" in error and "Traceback" not in error
     assert not blocks_of(tmp_path) and nothing_is_aside(tmp_path)
-    assert command(objects, *FEW, "--output", tmp_path)[0] == 0
-    assert rows_of(tmp_path) == rows_of(plain)
+    completes()
 
 
 def cut(path):
@@ -342,29 +359,20 @@ def replace_by_another(path):
 
 
 @pytest.mark.parametrize("damage", [Path.touch, cut, flip, flip_footer, foreign, replace_by_another])
-def test_a_damaged_block_is_named_and_made_again(command, objects, plain, tmp_path, damage):
-    for path in (plain / "manifest.json", *blocks_of(plain)):
-        target = tmp_path / path.relative_to(plain)
-        target.parent.mkdir(exist_ok=True)
-        target.write_bytes(path.read_bytes())
+def test_a_damaged_block_is_named_and_made_again(completes, plain, tmp_path, damage):
+    shutil.copytree(plain, tmp_path, dirs_exist_ok=True)
     broken = blocks_of(tmp_path)[4]
     if damage is Path.touch:
         broken.unlink()
     damage(broken)
-    code, _, error = command(objects, *FEW, "--output", tmp_path)
-    assert code == 0, error
+    error = completes()
     assert f'"{broken}" is damaged, and is made again' in error and "8 of 9 blocks are there already" in error
-    assert rows_of(tmp_path) == rows_of(plain)
     assert f'"{broken}" is damaged' in (tmp_path / "log.txt").read_text()
 
 
-def test_a_block_that_is_damaged_during_the_run_is_made_again(
-    command, objects, plain, tmp_path, in_the_middle
-):
+def test_a_block_that_is_damaged_during_the_run_is_made_again(completes, tmp_path, in_the_middle):
     in_the_middle(tmp_path, lambda: cut(blocks_of(tmp_path)[0]))
-    code, _, error = command(objects, *FEW, "--output", tmp_path)
-    assert code == 0 and "is damaged, and is made again" in error
-    assert rows_of(tmp_path) == rows_of(plain)
+    assert "is damaged, and is made again" in completes()
 
 
 def test_rows_of_something_else_are_refused_by_name(command, objects, tmp_path):
@@ -383,8 +391,6 @@ def test_rows_of_something_else_are_refused_by_name(command, objects, tmp_path):
 
 @pytest.mark.parametrize("files", [{"a.ply": 7}, {"a.ply": {"a": 7}}, [["a.ply", "hash"]]])
 def test_a_manifest_of_something_else_is_refused(command, objects, tmp_path, files):
-    import json
-
     words = (objects / "pebble.ply", "--touches", "3", "--output", tmp_path)
     assert command(*words)[0] == 0
     kept = json.loads((tmp_path / "manifest.json").read_text())
@@ -395,7 +401,7 @@ def test_a_manifest_of_something_else_is_refused(command, objects, tmp_path, fil
 
 
 def test_a_second_run_in_the_same_folder_is_refused_until_the_first_has_ended(
-    command, objects, plain, tmp_path
+    command, completes, objects, tmp_path
 ):
     run = started(objects, *FEW, "--output", tmp_path, "--workers", "1")
     wait_for(lambda: blocks_of(tmp_path))
@@ -406,8 +412,7 @@ def test_a_second_run_in_the_same_folder_is_refused_until_the_first_has_ended(
     assert sorted(tmp_path.rglob("*")) == before
     os.killpg(run.pid, signal.SIGKILL)
     run.communicate()
-    assert command(objects, *FEW, "--output", tmp_path)[0] == 0
-    assert rows_of(tmp_path) == rows_of(plain) and nothing_is_aside(tmp_path)
+    completes()
 
 
 def test_a_name_that_is_not_utf_8_costs_only_its_file(command, objects, tmp_path):
@@ -437,43 +442,31 @@ def test_a_mesh_with_vertices_that_are_not_finite_is_error_rows(command, objects
     assert (rows["pebble"]["ok"], rows["nan"]["error"], rows["far"]["error"]) == (3, 3, 3)
 
 
-def test_a_worker_whose_run_is_gone_finishes_the_file_that_it_writes(objects, plain, tmp_path):
-    import json
-
-    from cluster.data_set import manifest
-    from cluster.worker.process import HandProcess
-
-    options = json.loads((plain / "manifest.json").read_text())["options"]
+def test_a_worker_whose_run_is_gone_finishes_the_file_that_it_writes(hand, options, tmp_path):
     for tenth in range(4):
-        hand = HandProcess()
-        _, (facts,) = hand.ask(100.0, "survey", str(objects / "pebble.ply"), manifest.versions())
+        process = hand()
         folder = tmp_path / str(tenth) / "touches"
         folder.mkdir(parents=True)
-        order = (100.0, "touch", (facts, options, 0, str(folder / "block.parquet")))
-        hand._connection.send(order)
+        order = (100.0, "touch", (process.facts, options, 0, str(folder / "block.parquet")))
+        process._connection.send(order)
         wait_for(lambda folder=folder: list(folder.iterdir()))  # It has begun to write.
-        hand._connection.close()
-        hand._process.wait(10.0)
+        process._connection.close()
+        process._process.wait(10.0)
         assert [path.name for path in folder.iterdir()] == ["block.parquet"]
-        hand._said.close()
+        process._said.close()
 
 
-def test_blender_leaves_no_folder_of_its_own(objects, plain, tmp_path, monkeypatch):
-    from cluster.data_set import manifest
-    from cluster.worker.process import HandProcess
-
+def test_blender_leaves_no_folder_of_its_own(hand, tmp_path, monkeypatch):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
-    hands = [HandProcess(), HandProcess()]
-    for hand in hands:
-        assert hand.ask(100.0, "survey", str(objects / "pebble.ply"), manifest.versions())[0] == "done"
-    os.kill(hands[0]._process.pid, signal.SIGKILL)
-    for hand in hands:
-        hand.close()
+    started = [hand(), hand()]
+    os.kill(started[0]._process.pid, signal.SIGKILL)
+    for process in started:
+        process.close()
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("ended", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_run_ends_cleanly_and_goes_on_later(command, objects, plain, tmp_path, ended):
+def test_an_interrupted_run_ends_cleanly_and_goes_on_later(completes, objects, tmp_path, ended):
     run = started(objects, *FEW, "--output", tmp_path, "--workers", "1")
     wait_for(lambda: blocks_of(tmp_path))
     os.killpg(run.pid, signal.SIGSTOP)  # otherwise it may be done before it is interrupted
@@ -488,9 +481,7 @@ def test_an_interrupted_run_ends_cleanly_and_goes_on_later(command, objects, pla
     wait_for(lambda: not any(p.is_running() and p.status() != "zombie" for p in below))
     made = len(blocks_of(tmp_path))
     assert nothing_is_aside(tmp_path)
-    code, _, error = command(objects, *FEW, "--output", tmp_path)
-    assert code == 0 and f"{made} of 9 blocks are there already" in error
-    assert rows_of(tmp_path) == rows_of(plain)
+    assert f"{made} of 9 blocks are there already" in completes()
 
 
 def test_workers_do_not_print_that_a_heartbeat_met_the_end_of_their_scheduler(cluster):
@@ -521,16 +512,13 @@ def test_a_worker_without_blender_is_said(objects, monkeypatch):
     assert value.endswith("(it did not say why): start workers in an environment that has it")
 
 
-def test_a_process_that_has_opened_enough_gives_way(objects, monkeypatch):
+def test_a_process_that_has_opened_enough_gives_way(hand, objects, monkeypatch):
     from cluster.data_set import manifest
     from cluster.worker import process
 
     monkeypatch.setattr(process, "MOST_OPENED", 2)
-    hand = process.HandProcess()
-    path = str(objects / "pebble.ply")
-    for opened in (1, 2):
-        assert not hand.is_worn
-        how, (facts,) = hand.ask(100.0, "survey", path, manifest.versions())
-        assert (how, facts["name"], hand._opened) == ("done", "pebble", opened)
-    assert hand.is_worn
-    hand.close()
+    opened = hand()
+    assert not opened.is_worn and opened._opened == 1
+    opened.ask(100.0, "survey", str(objects / "pebble.ply"), manifest.versions())
+    assert opened.is_worn and opened._opened == 2
+    opened.close()
