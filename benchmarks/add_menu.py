@@ -85,9 +85,11 @@ def scans():
 
 
 def touched(add):
-    """(the object that a function adds, the touched surface, CPU seconds)."""
+    """(the object that a function adds, the touched surface, CPU seconds); others are hidden."""
     import bpy
 
+    for obj in bpy.data.objects:
+        obj.hide_set(True)
     add()
     source = bpy.context.object
     start = process_time()
@@ -125,8 +127,14 @@ def row(name, source, made, seconds):
     if (found.open > 0, found.euler, found.pieces) != (true.open > 0, true.euler, true.pieces):
         shape += f" ({true.open} / {true.euler} / {true.pieces})"
     off = (record[f"deviation_{key}"] / record["tolerance"] for key in ("mean", "max"))
-    touches = f"{record['touches']}"
-    return [name, touches, shape, *(f"{value:.2f}" for value in off), f"{seconds:.1f}", record["status"]]
+    return [
+        name,
+        str(record["touches"]),
+        shape,
+        *(f"{value:.2f}" for value in off),
+        f"{seconds:.1f}",
+        record["status"],
+    ]
 
 
 def placed(obj, column, line):
@@ -153,6 +161,8 @@ def draw(pairs, name):
 
     scene = bpy.context.scene
     for i, (source, made) in enumerate(pairs):
+        source.hide_set(False)
+        made.hide_set(False)
         made.data.materials.clear()
         source.data.materials.clear()
         for line, obj in enumerate((source, made)):
@@ -201,10 +211,6 @@ def main():
                 source, made, seconds = touched(add)
                 rows.append(row(name, source, made, seconds))
                 pairs.append((source, made))
-                for obj in bpy.data.objects:
-                    obj.hide_set(True)
-        for obj in bpy.data.objects:
-            obj.hide_set(False)
         draw(pairs, "touched" if options.scans else "add_menu")
     table(["object", "touches", "open / Euler / pieces", "mean", "largest", "CPU s", "status"], rows)
     print(f"{machine('bpy', 'numpy', 'scipy')}.")

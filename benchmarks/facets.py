@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far curvatures are off where few facets of a mesh were felt, and how often verdicts on them are wrong.
+"""How often verdicts on touches of meshes of few facets are wrong.
 
-`python -m benchmarks.facets ZIP`, from the root of a checkout; ZIP is the built extension.
+`python -m benchmarks.facets ZIP [--models FOLDER]`, from the root of a checkout; ZIP is the built extension.
 It touches meshes at random points (seeded, by area). The error is that of a principal curvature, as a share
 of the larger one.
 The curvatures of balls, tori, cylinders and cones of Blender's Add menu are known exactly, and those of balls
@@ -10,17 +10,21 @@ that are scaled along their axis. Suzanne with one to three levels of subdivisio
 levels. These are touched with an automatic extent. Scans are touched with a 32nd of their size, and compared
 with patches three times as long; without the folder of scans their rows are left out.
 
-The first Markdown table has the median error of the shapes of the Add menu, by the number of facets of
-different directions that the contacts lie on: where the verdict is about the shape, and where it is about the
-facets. The second counts, for all objects, patches that are good and those that are about the facets. Of the
+A Markdown table counts, for all objects, patches that are good and those that are about the facets. Of the
 good ones it counts those that are off by over 1/4, and those of these that are beyond two stated deviations:
 they are wrong. So are those about the facets with an error below .15.
+
+With --models it touches the .obj files of a folder, as those of github:alecjacobson/common-3d-test-models, at
+twelve points each, and counts those that are sure. They are compared with their mesh under a Subdivision
+modifier, where patches of the same radius and of half of it agree. A sure one is wrong if it is off by over
+1/4, by more than .1 / L and by more than two stated deviations. A doubt about facets is right if it is off by
+more than .1 / L and two deviations that the contacts alone have.
 """
 
 import argparse
 import math
 from collections import defaultdict
-from itertools import pairwise
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
 
@@ -30,13 +34,14 @@ from tests.surfaces import ellipsoid
 from tools import blender
 
 from . import SCANS_FOLDER, machine, table
-from .scans import sampling_planes
+from .models import imported
+from .paper import AZIMUTHS
 
 POINTS = 60
 TOP = 0.9999  # The lids of cylinders and cones, which are flat, are beyond this height; they are left out.
-BINS = (1, 2, 4, 6, 8, 10, 12, 16, 24, 40, math.inf)  # Each goes up to the next.
 WRONG, RIGHT = 0.25, 0.15  # Good patches with larger errors may be wrong, those of facets with smaller ones.
-WITHIN = 2.0  # Deviations within which a curvature is right.
+WITHIN, KNOWN = 2.0, 0.1  # Deviations, and a share of 1 / L, within which a curvature is right.
+OF_MODELS, SEED, MOST_FACES = 12, 7, 600_000  # Points of a model, and faces of it when it is subdivided.
 FINEST, AGREE = 5, 0.15  # Suzanne's curvatures are those of these levels where two extents agree to this.
 SCANS = {
     "pear": "pear.ply",
@@ -136,11 +141,11 @@ def objects(bpy, add_on, touch):
         yield name, obj, extent, of_longer
 
 
-def places(obj, depsgraph):
+def places(obj, depsgraph, count=POINTS, seed=0):
     """Random places in the world on the faces of an object as Blender evaluates it."""
-    mesh, rng = obj.evaluated_get(depsgraph).data, np.random.default_rng(0)
+    mesh, rng = obj.evaluated_get(depsgraph).data, np.random.default_rng(seed)
     areas = np.array([face.area for face in mesh.polygons])
-    for number in rng.choice(len(areas), POINTS, p=areas / areas.sum()):
+    for number in rng.choice(len(areas), count, p=areas / areas.sum()):
         corners = [
             np.array(obj.matrix_world @ mesh.vertices[i].co) for i in mesh.polygons[int(number)].vertices
         ]
@@ -167,27 +172,17 @@ def deviation(r):
     return max(r.k1_std, r.k2_std)
 
 
-def felt(touched):
-    """The number of facets of different directions that contacts lie on."""
-    surface, normals = touched.surface, []
-    for point in np.vstack([contour.points for contour in touched.result.contours]):
-        corners = surface.corners_of(surface.face_near(point))
-        normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-        normal /= np.linalg.norm(normal)
-        if all(normal @ other < math.cos(math.radians(1.0)) for other in normals):
-            normals.append(normal)
-    return len(normals)
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("zip", type=Path, metavar="ZIP")
+    parser.add_argument("--models", type=Path, metavar="FOLDER")
     arguments = parser.parse_args()
     with blender.quiet():
         extension = blender.start(arguments.zip)
     import bpy
 
-    planes, add_on = sampling_planes(extension), extension.tactile_addon
+    planes = [extension.core.SamplingPlane(math.radians(azimuth)) for azimuth in AZIMUTHS]
+    add_on = extension.tactile_addon
     fit = {"seed": 0, "method": "bayes", "degree": "auto", "weight": None, "solver": "fast"}
 
     def touch(obj, place, extent):
@@ -198,7 +193,11 @@ def main():
         except ValueError:
             return None
 
-    errors = defaultdict(list)  # By object: (facets felt, verdict, error, whether it is wrong) of each patch.
+    if arguments.models:
+        print_models(bpy, sorted(arguments.models.glob("*.obj")), touch)
+        print(f"Seed {SEED}; {machine('bpy')}.")
+        return
+    errors = defaultdict(list)  # By object: (verdict, error, whether it is wrong) of each patch.
     with blender.quiet():
         for name, obj, extent, true_curvatures in objects(bpy, add_on, touch):
             for place in places(obj, bpy.context.evaluated_depsgraph_get()):
@@ -207,25 +206,75 @@ def main():
                 if true and any(true):
                     error = off_by(found, true)
                     is_wrong = error > WRONG and error * np.abs(true).max() > WITHIN * deviation(found.result)
-                    errors[name].append((felt(found), verdict(found), error, is_wrong))
+                    errors[name].append((verdict(found), error, is_wrong))
     print_tables(errors)
     print(f"Seed 0; {machine('bpy')}.")
 
 
+def opened(bpy, path):
+    """The mesh of a file, and a copy of it that is subdivided."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    imported(path)
+    obj = bpy.context.view_layer.objects.active = bpy.context.selected_objects[0]
+    if len(bpy.context.selected_objects) > 1:
+        bpy.ops.object.join()
+    fine = obj.copy()
+    bpy.context.collection.objects.link(fine)
+    levels = math.log(MOST_FACES / (3 * len(obj.data.polygons)), 4)
+    fine.modifiers.new("Subdivision", "SUBSURF").levels = min(max(int(levels), 1), 4)
+    return obj, fine
+
+
+def of_model(found, whole, half):
+    """Whether the curvatures of a touch are known, wrong by their deviations, and beyond those of contacts.
+
+    whole, half : touches of the subdivided mesh, or None
+    """
+    r, bare = found.result, replace(found.result, shape_curvatures=np.empty((0, 2)))
+    if not (whole and half):
+        return False, False, False
+    true, other = np.sort(curvatures(half)), np.sort(curvatures(whole))
+    largest, off = np.abs(true).max(), np.abs(np.sort(curvatures(found)) - true).max()
+    is_known = np.abs(other - true).max() <= max(AGREE * largest, 0.5 * KNOWN / r.radius)
+    least = KNOWN / r.radius
+    return (
+        is_known,
+        off > max(least, WRONG * largest, WITHIN * deviation(r)),
+        off > max(least, WITHIN * deviation(bare)),
+    )
+
+
+def print_models(bpy, paths, touch):
+    rows, total = [], np.zeros(6, dtype=int)
+    for path in paths:
+        with blender.quiet():
+            obj, fine = opened(bpy, path)
+            counts = np.zeros(6, dtype=int)
+            for place in places(obj, bpy.context.evaluated_depsgraph_get(), OF_MODELS, SEED):
+                found = touch(obj, place, 0.0)
+                if found is None:
+                    continue
+                fitted = (touch(fine, place, share * found.result.radius) for share in (1.0, 0.5))
+                is_known, is_wrong, is_off = of_model(found, *fitted)
+                is_sure, is_of_facets = verdict(found) == "ok", verdict(found) == "facets"
+                counts += [
+                    *(1, is_sure, is_sure and is_known, is_sure and is_known and is_wrong),
+                    *(is_of_facets and is_known, is_of_facets and is_known and not is_off),
+                ]
+        total += counts
+        rows.append([path.stem, *map(str, counts)])
+    rows.append(["all", *map(str, total)])
+    head = ["model", "touches", "sure", "known", "wrong", "doubts about facets, known", "not needed"]
+    table(head, rows)
+    print(f"{total[1] / total[0]:.2f} of the touches are sure.")
+
+
 def print_tables(errors):
-    every = [each for kind in ("balls", "tori", "cylinders", "cones") for each in errors[kind]]
-    rows = []
-    for least, end in pairwise(BINS):
-        here = [each for each in every if least <= each[0] < end]
-        shape, facets = ([row[2] for row in here if (row[1] == "facets") is of] for of in (False, True))
-        cells = (cell for of in (shape, facets) for cell in (str(len(of)), f"{median(of):.2f}" if of else ""))
-        rows.append([f"{least} to {end - 1}", *cells])
-    table(["facets felt", "shape", "error", "facets", "error"], rows)
     rows = []
     for name, found in errors.items():
-        good, facets = ([off for _, what, off, _ in found if what == of] for of in ("ok", "facets"))
+        good, facets = ([off for what, off, _ in found if what == of] for of in ("ok", "facets"))
         off = sum(error > WRONG for error in good)
-        wrong = sum(bad and what == "ok" for _, what, _, bad in found), sum(error < RIGHT for error in facets)
+        wrong = sum(bad and what == "ok" for what, _, bad in found), sum(error < RIGHT for error in facets)
         counts = len(found), len(good), off, wrong[0], len(facets), wrong[1]
         rows.append([name, *map(str, counts), *(f"{median(of):.2f}" if of else "" for of in (good, facets))])
     head = ["object", "patches", "good", "off by 1/4", "wrong", "facets", "wrong"]

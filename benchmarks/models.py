@@ -54,10 +54,6 @@ def main():
             if rows[-1][-1] != "ok":
                 messages.append(f"{path.stem}: {made['tactile_object']['message']}")
             pairs.append((source, made))
-            for obj in bpy.data.objects:
-                obj.hide_set(True)
-        for obj in bpy.data.objects:
-            obj.hide_set(False)
         draw(pairs, "models")
     table(["model", "touches", "open / Euler / pieces", "mean", "largest", "CPU s", "status"], rows)
     print("\n\n".join(messages))

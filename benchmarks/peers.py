@@ -43,9 +43,6 @@ def _scaled_fit(r, height):
     return Fit(r.frame.axes, lambda x, y: r.radius * height(np.column_stack([x, y]) / r.radius))
 
 
-# Interpolation and regression ------------------------------------------------------------------------
-
-
 def gaussian_process(case, nu=2.5):
     """A process whose hyperparameters, with the noise, have the maximum likelihood.
 
@@ -137,9 +134,6 @@ def jet(case, degree):
     return _scaled_fit(r, lambda points: monomials(points, terms) @ b)._replace(kappas=tuple(kappas))
 
 
-# Splines ---------------------------------------------------------------------------------------------
-
-
 def smoothing_spline(case, degree=2, misfit=5e-3):
     """FITPACK's surfit, with the given noise and a `misfit` of its own, in L.
 
@@ -155,9 +149,6 @@ def smoothing_spline(case, degree=2, misfit=5e-3):
         warnings.simplefilter("ignore")  # It warns of knots that it would like to add.
         spline = SmoothBivariateSpline(*contacts.T, **options)
     return _scaled_fit(r, lambda points: spline.ev(*points.T))
-
-
-# Meshes ----------------------------------------------------------------------------------------------
 
 
 def screened_poisson(case, true_normals, neighbors=40):

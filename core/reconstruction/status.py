@@ -40,7 +40,7 @@ FLAT = 0.5  # A point is on a flat face if more than this share of the contacts,
 FLAT_COSINE = math.cos(math.radians(0.5))  # have its normal, to half a degree. Its curvature is then below
 BENT, BENT_DEVIATIONS = 0.02, 3.0  # this share of 1 / radius, or this many deviations (tests of core.scan).
 # The curvature is that of facets if it is off all estimates of the shape's by this share of the larger one,
-# and by this multiple of what estimates are apart (benchmarks.facets --models, 8f74ae57).
+# and by this multiple of what estimates are apart (benchmarks.facets --models).
 OFF_SHAPE, DISAGREEING = 0.21, 1.5
 DOUBTFUL_GAP = 0.04  # Share of the area that has no surface: near a straight edge it may be 0.03.
 
