@@ -34,7 +34,6 @@ from tests.surfaces import ellipsoid
 from tools import blender
 
 from . import SCANS_FOLDER, machine, table
-from .models import imported
 from .paper import AZIMUTHS
 
 POINTS = 60
@@ -214,7 +213,7 @@ def main():
 def opened(bpy, path):
     """The mesh of a file, and a copy of it that is subdivided."""
     bpy.ops.wm.read_homefile(use_empty=True)
-    imported(path)
+    bpy.ops.wm.obj_import(filepath=str(path))
     obj = bpy.context.view_layer.objects.active = bpy.context.selected_objects[0]
     if len(bpy.context.selected_objects) > 1:
         bpy.ops.object.join()
