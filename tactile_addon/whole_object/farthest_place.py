@@ -10,7 +10,7 @@ from ... import core
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Array
 from ..touch.units import Unit, length
-from .both_ways import DIRECTIONS, LIFT
+from .both_ways import DIRECTIONS, room
 
 # The indicator of a surface has at most 200 cells along the object, of which a wall needs three.
 THIN_SHARE = 3.0 / 200.0
@@ -25,7 +25,7 @@ def why_far(
     patch : what was felt nearest to the place, if anything was
     """
     foot, normal = (np.array(vector) for vector in surface.project(place.tolist())[:2])
-    narrow = min(_room(surface, foot, sign * normal) for sign in (-1.0, 1.0))
+    narrow = narrowest(surface, foot, normal)
     words = length(off, unit), length(narrow, unit)
     if surface.open_edge_distance(place) <= off:
         code = "open_edges"
@@ -40,13 +40,12 @@ def why_far(
     return core.Doubt(code, off, words=words)
 
 
-def _room(surface: DetachedMesh, foot: Array, way: Array) -> float:
-    """How far the next wall is from a place of the mesh along a direction; inf if there is none."""
-    hit = surface.ray_cast((foot + LIFT * surface.size * way).tolist(), way.tolist(), surface.size)
-    return math.inf if hit is None else math.dist(hit[0], foot)
+def narrowest(surface: DetachedMesh, foot: Array, normal: Array) -> float:
+    """How far the next wall is from a place of the mesh, above it or below it."""
+    return min(room(surface, foot, sign * normal) for sign in (-1.0, 1.0))
 
 
 def _free_share(surface: DetachedMesh, foot: Array, normal: Array) -> float:
     """The share of rays on the outer side of a place of the mesh that meet nothing."""
     ways = DIRECTIONS[DIRECTIONS @ normal > 0.0]
-    return sum(math.isinf(_room(surface, foot, way)) for way in ways) / len(ways)
+    return sum(math.isinf(room(surface, foot, way)) for way in ways) / len(ways)

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Touches that grow over an object, step by step, with nothing changed in the scene."""
 
-import math
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
@@ -19,7 +18,7 @@ from ..touch.touch_report import verdict_report
 from ..touch.types import Array, Object
 from ..touch.units import Unit, length
 from .both_ways import BothWays
-from .farthest_place import why_far
+from .farthest_place import narrowest, why_far
 from .object_report import OFF_TOLERANCES, WITHIN_SHARE, unit_of, within
 from .whole_surface import WholeSurface
 
@@ -28,7 +27,6 @@ TOLERANCE_SHARES = {"quick": 1.0 / 200.0, "normal": 1.0 / 500.0, "fine": 1.0 / 1
 LARGEST_TOLERANCE, LARGEST_EDGE = 0.1, 0.5  # With more, neither patches nor triangles would fit.
 STARTS = 20  # The number of places to begin that are tried, besides the one that is given.
 ROOM = 0.05  # Places with this share of the size of room are tried first.
-HAIR = 1e-5  # Rays begin this share of the size away from a place.
 PLACES, SEED = 1000, 0  # The progress is the share of this many places on the mesh that patches cover.
 # Of all that is to be done, touching and joining are done at these shares; of touching and joining again,
 # touching is done at the last one.
@@ -165,16 +163,8 @@ class ObjectTouches:
         for middle in self.surface.points[faces].mean(axis=1):  # It is off all edges.
             with suppress(ValueError):  # The face has no area.
                 found.append(self.surface.project(middle)[:2])
-        return sorted(found, key=lambda place: -min(self._room(*place), ROOM * self.surface.size))
-
-    def _room(self, point: Any, outward: Any) -> float:
-        """How far a place is from the next wall before it, or below it if that is nearer."""
-        size, rooms = self.surface.size, []
-        for way in (np.array(outward), -np.array(outward)):
-            start = point + HAIR * size * way
-            hit = self.surface.ray_cast(start.tolist(), way.tolist(), size)
-            rooms.append(size if hit is None else math.dist(hit[0], start))
-        return min(rooms)
+        most = ROOM * self.surface.size
+        return sorted(found, key=lambda place: -min(narrowest(self.surface, *map(np.array, place)), most))
 
     def _spread(self) -> Array:
         """Places all over the mesh, (PLACES, 3), of which patches will cover more and more."""
