@@ -128,34 +128,66 @@ def _inputs(patch: Object, target: Object) -> tuple[Any, ...]:
     )
 
 
-class TACTILE_OT_verify(InSlices, bpy.types.Operator):
+class WithMesh(InSlices):
+    """For operators to inherit that compare the active patch with a mesh, or put it onto one."""
+
+    target: StringProperty(
+        name="Target",
+        description="Name of the mesh object; empty for the other selected mesh, or for the one that was "
+        "touched",
+    )
+    shown = ("target",)
+    hint: str  # What to select.
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return (
+            has_patch(cls, context, cls.hint)
+            and is_in_object_mode(cls, context, "Patches are compared")
+            and is_unlocked(cls, context)
+        )
+
+    def _mesh(self, context: bpy.types.Context, patch: Object) -> Object:
+        """The mesh object with the name, that is selected, that the patch is for, or that was touched.
+
+        Raises ValueError if there is none, or if several meshes are selected.
+        """
+        if self.target:
+            return target_object(context, self.target)
+        names = [
+            obj.name
+            for obj in context.view_layer.objects.selected
+            if obj.type == "MESH" and not probe.is_result(obj)
+        ]
+        if len(names) > 1:
+            raise ValueError(
+                f"{len(names)} meshes are selected: select one besides the patch, or none to compare "
+                "with the one that was touched"
+            )
+        name = names[0] if names else patch.tactile_target
+        source = probe.record_of(patch)
+        if not name and source is not None and source["source"] not in bpy.data.objects:
+            raise ValueError(
+                f'"{patch.name}" was not touched on a mesh of this file: select the mesh, then the patch'
+            )
+        return target_object(context, name)
+
+
+class TACTILE_OT_verify(WithMesh, bpy.types.Operator):
     """Measure how far the active patch is from the mesh it was touched on, or from another selected mesh"""
 
     bl_idname = "tactile.verify"
     bl_label = "Verify Against Mesh"
     bl_options = {"REGISTER", "UNDO"}
 
-    target: StringProperty(
-        name="Target",
-        description="Name of the mesh object to compare with; empty for the other selected mesh, or for the "
-        "one that was touched",
-    )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return (
-            has_patch(cls, context, "Select a patch; to compare it with another mesh, select that first")
-            and is_in_object_mode(cls, context, "Patches are verified")
-            and is_unlocked(cls, context)
-        )
+    hint = "Select a patch; to compare it with another mesh, select that first"
 
     def _begin(self, context: bpy.types.Context) -> None:
         obj = context.view_layer.objects.active
         found, patch = probe.probe_of(obj), probe.patch_near(obj)
         if found is not None and is_pending(found):  # Completing it later would undo the verification.
             touch_again.refresh(found, context)
-        target = target_object(context, self.target or chosen_mesh(context, patch))
-        self._verification = Verification(patch, target)
+        self._verification = Verification(patch, self._mesh(context, patch))
         self._steps = self._verification.steps()
 
     def _check(self, context: bpy.types.Context) -> None:
@@ -173,32 +205,3 @@ class TACTILE_OT_verify(InSlices, bpy.types.Operator):
         probe.patch_near(context.view_layer.objects.active).tactile_colors = "deviation"
         doubt, summary = verification_summary(record)
         return report_done(self, summary, not doubt)
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.prop_search(self, "target", context.scene, "objects")
-
-
-def chosen_mesh(context: bpy.types.Context, patch: Object) -> str:
-    """The name of the selected mesh, or of the patch's own target, or of the mesh it was touched on.
-
-    Raises ValueError if there is none, or if several meshes are selected.
-    """
-    names = [
-        obj.name
-        for obj in context.view_layer.objects.selected
-        if obj.type == "MESH" and not probe.is_result(obj)
-    ]
-    if len(names) > 1:
-        raise ValueError(
-            f"{len(names)} meshes are selected: select one besides the patch, or none to compare "
-            "with the one that was touched"
-        )
-    name = names[0] if names else patch.tactile_target
-    source = probe.record_of(patch)
-    if not name and source is not None and source["source"] not in bpy.data.objects:
-        raise ValueError(
-            f'"{patch.name}" was not touched on a mesh of this file: select the mesh, then the patch'
-        )
-    return name

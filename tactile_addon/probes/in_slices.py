@@ -10,11 +10,11 @@ from typing import Any, TypeAlias
 import bpy
 from bpy.props import BoolProperty
 
-from ..touch.settings import TARGET, UNSAVED
+from ..touch.settings import TARGET, UNSAVED, draw_chosen
 from ..touch.types import OperatorMixin, Outcome
 from ..touch.units import duration
 from ..touch.wording import sentence
-from .operators import report_error, target_object, waiting
+from .operators import has_target, is_in_object_mode, report_error, target_object, waiting
 
 # These are seconds.
 FIRST_SLICE = 0.2  # Work that takes no longer is done without slices.
@@ -51,6 +51,7 @@ class InSlices(OperatorMixin):
     stop = "Stop"  # What Esc does,
     stopped = "Stopped: the patch stays as it was"  # and what is reported then.
     meanwhile = {"RUNNING_MODAL"}  # What modal() returns for all other events.
+    shown: tuple[str, ...] = ()  # The settings in its dialog; "target" is the name of an object.
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         try:
@@ -143,6 +144,16 @@ class InSlices(OperatorMixin):
         self.report({"INFO"}, self.stopped)
         return {"CANCELLED"}
 
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draws the settings that are `shown`."""
+        layout = self.layout
+        layout.use_property_split, layout.use_property_decorate = True, False
+        for name in self.shown:
+            if name == "target":
+                layout.prop_search(self, name, context.scene, "objects")
+            else:
+                draw_chosen(layout, self, name)
+
     def _leave(self, context: bpy.types.Context) -> None:
         """Removes everything that shows that it is going on."""
         if self._timer is not None:
@@ -199,6 +210,7 @@ class AllOver(InSlices):
     target: TARGET
 
     meanwhile = {"PASS_THROUGH"}  # The scene may change, because a detached mesh is touched.
+    shown = ("target",)
     _about: Callable[[bpy.types.Context], str]
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
@@ -210,16 +222,18 @@ class AllOver(InSlices):
             return report_error(self, error)
         return self._confirm(context, "Touch")
 
-    def _draw_target(self, context: bpy.types.Context) -> None:
-        """Draws the mesh and what it will take."""
-        layout = self.layout
-        layout.use_property_split, layout.use_property_decorate = True, False
-        layout.prop_search(self, "target", context.scene, "objects")
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return is_in_object_mode(cls, context, "Objects are touched") and has_target(cls, context)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draws the settings, and what it will take with them."""
+        super().draw(context)
         try:
             words = self._about(context)
         except ValueError as error:
             words = sentence(error)
-        layout.label(text=words, translate=False)
+        self.layout.label(text=words, translate=False)
 
 
 def _status(stop: str, words: str, share: float | None) -> Callable[[Any, bpy.types.Context], None]:

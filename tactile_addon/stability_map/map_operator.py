@@ -7,23 +7,10 @@ import bpy
 from ...core.arguments import many
 from ..probes import probe
 from ..probes.in_slices import AllOver, Progress
-from ..probes.operators import (
-    has_target,
-    is_in_object_mode,
-    make_active,
-    report_done,
-    target_object,
-)
+from ..probes.operators import make_active, report_done, target_object
 from ..scene import patch_record
 from ..touch import units
-from ..touch.settings import (
-    NAMES,
-    TouchSettings,
-    draw_chosen,
-    draw_noise,
-    length_property,
-    touch_arguments,
-)
+from ..touch.settings import NAMES, TouchSettings, length_property, touch_arguments
 from ..touch.types import Outcome
 from . import map_object
 from .map_report import map_summary
@@ -44,11 +31,8 @@ class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
     )
 
     stop = "Stop and Keep"
+    shown = ("target", "spacing", "extent", "noise", "seed")  # All else is as the active probe has it.
     _counted: tuple[object, str] = (None, "")  # What was said last, after what it depends on.
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return is_in_object_mode(cls, context, "Maps are made") and has_target(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
@@ -98,9 +82,3 @@ class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
             words = f"about {many(units.rough(count), 'touch', 'touches')}, {units.duration(seconds)}"
             self._counted = given, f"{target.name}: {words}"
         return self._counted[1]
-
-    def draw(self, context: bpy.types.Context) -> None:
-        self._draw_target(context)
-        for name in ("spacing", "extent"):  # All else is as the active probe has it.
-            draw_chosen(self.layout, self, name)
-        draw_noise(self.layout, self)

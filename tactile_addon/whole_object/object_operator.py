@@ -9,16 +9,10 @@ from bpy.props import EnumProperty, FloatVectorProperty, IntProperty
 
 from ..probes import probe
 from ..probes.in_slices import AllOver, InSlices, Progress
-from ..probes.operators import (
-    has_target,
-    is_in_object_mode,
-    make_active,
-    report_done,
-    target_object,
-)
+from ..probes.operators import make_active, report_done, target_object
 from ..probes.probe_operators import TACTILE_OT_add_subdivision
 from ..scene import patch_record
-from ..touch.settings import NOISE, UNSAVED, draw_chosen, given, length_property
+from ..touch.settings import NOISE, UNSAVED, given, length_property
 from ..touch.types import Outcome
 from . import kept, whole_mesh
 from .expected import Expected
@@ -118,11 +112,8 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
     )
     edge: EDGE
 
+    shown = ("target", "accuracy", "tolerance", "edge", "most", "noise", "seed")
     _expected = None
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return is_in_object_mode(cls, context, "Objects are touched") and has_target(cls, context)
 
     def _begin(self, context: bpy.types.Context) -> None:
         target, found = target_object(context, self.target), probe.probe_of(context.view_layer.objects.active)
@@ -156,18 +147,10 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
         return self._expected.words(target, context, self.tolerance, self.accuracy, self.noise)
 
     def draw(self, context: bpy.types.Context) -> None:
-        self._draw_target(context)
+        super().draw(context)
         layout = self.layout
         for warning in self._expected.warnings if self._expected else ():
             layout.label(text=warning, icon="ERROR")
         if self._expected is not None and self._expected.is_faceted:
             button = layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
             button.target = self.target
-        row = layout.row()
-        row.active = not self.tolerance
-        row.prop(self, "accuracy", expand=True)
-        draw_chosen(layout, self, "tolerance")
-        draw_chosen(layout, self, "edge")
-        layout.prop(self, "most")
-        layout.prop(self, "noise")
-        layout.prop(self, "seed")

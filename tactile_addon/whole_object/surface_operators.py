@@ -16,7 +16,7 @@ from ..scene.attributes import DEVIATION
 from ..scene.mesh_data import own_mesh, values
 from ..touch import units
 from ..touch.arrays import read_array
-from ..touch.settings import draw_chosen, length_property
+from ..touch.settings import length_property
 from ..touch.types import Object, Outcome, Point
 from . import kept, whole_mesh
 from .object_operator import EDGE, Growing
@@ -129,6 +129,7 @@ class TACTILE_OT_mesh_again(OnSurface, bpy.types.Operator):
     edge: EDGE
 
     stop = "Keep It as It Was"
+    shown = ("edge",)
     stopped = "Stopped: the surface stays as it was"
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
@@ -152,11 +153,6 @@ class TACTILE_OT_mesh_again(OnSurface, bpy.types.Operator):
             summary += f"; edges are {units.length(record['edge'], unit_of(record))} long, as thin walls need"
         return report_done(self, summary)
 
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split, layout.use_property_decorate = True, False
-        draw_chosen(layout, self, "edge")
-
 
 class TACTILE_OT_continue_touching(Growing, OnSurface, bpy.types.Operator):
     """Go on touching the object from where its surface ended, with more touches or to a smaller tolerance"""
@@ -176,6 +172,7 @@ class TACTILE_OT_continue_touching(Growing, OnSurface, bpy.types.Operator):
         soft_max=10_000,
     )
 
+    shown = ("tolerance", "more")
     stopped = "Stopped: the surface stays as it was"
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
@@ -191,12 +188,6 @@ class TACTILE_OT_continue_touching(Growing, OnSurface, bpy.types.Operator):
         self._touches.surface.require_same(context)
         record = self._rewrite(context)
         return report_done(self, object_summary(record), record["status"] == "ok")
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split, layout.use_property_decorate = True, False
-        draw_chosen(layout, self, "tolerance")
-        layout.prop(self, "more")
 
 
 CLASSES = (TACTILE_OT_look_farthest, TACTILE_OT_mesh_again, TACTILE_OT_continue_touching)
