@@ -16,7 +16,7 @@ from .scene import shown
 from .sidebar import dots, panel, preferences, rows
 from .stability_map import map_object, map_operator
 from .viewport import drag, gizmos, overlay, pick, tool
-from .whole_object import kept, object_operator, surface_operators
+from .whole_object import object_operator, surface_operators
 
 CLASSES = (
     operators.TACTILE_OT_reconstruct,
@@ -80,7 +80,7 @@ def unregister() -> None:
     tool.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
-    kept.forget()
+    object_operator.forget()
     dots.unregister()
     for name in PROPERTIES:
         delattr(bpy.types.Object, name)

@@ -12,9 +12,7 @@ from ..files.export_operators import ObjectExport
 from ..probes import probe
 from ..scene import patch_record
 from ..touch.types import Object
-from .map_page import map_page
-from .object_page import object_page
-from .patch_page import patch_page
+from .pages import map_page, object_page, patch_page
 
 
 def write(path: str | Path, obj: Object) -> None:

@@ -19,13 +19,7 @@ UNKNOWN = (0.5, 0.5, 0.5, 1.0)  # The color of what has no value, in sRGB.
 
 def symmetric_range(values: Array, floor: float) -> float:
     """The r of a scale -r..r: the 98th percentile of |values|, so a few wild ones do not bleach the rest."""
-    if not len(values):
-        return floor
-    sizes, at = np.abs(values), 0.98 * (len(values) - 1)  # np.percentile would take five times as long.
-    before = int(at)
-    sizes.partition([before, min(before + 1, len(sizes) - 1)])
-    one, other = sizes[before], sizes[min(before + 1, len(sizes) - 1)]
-    return max(float(one + (at - before) * (other - one)), floor)
+    return max(float(np.percentile(np.abs(values), 98)), floor) if len(values) else floor
 
 
 def shades(values: ArrayLike, limit: float) -> Array:

@@ -125,7 +125,7 @@ def _limit(shown: str, values: Array, floor: float) -> float:
     """The end of the colors' range."""
     if shown == "blind_share":
         return 1.0
-    return colors.symmetric_range(values, floor) if len(values) else floor
+    return colors.symmetric_range(values, floor)
 
 
 def _least_range(painted: Object, shown: str) -> float:

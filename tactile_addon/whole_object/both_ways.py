@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a surface is off the mesh that was touched, and that mesh off the surface, all over their faces."""
+"""How far a surface is off the mesh that was touched, and back, all over their faces; and why that is."""
 
 import math
 from collections.abc import Callable, Generator, Iterator
@@ -14,6 +14,7 @@ from ...core.steps import part_of
 from ...core.triangles import middles_of_parts, normalized, triangle_cross
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Array, Point
+from ..touch.units import Unit, length
 
 PLACES, SEED = 10_000, 0  # The number of places on the faces of each, and the most vertices, to compare.
 STARTS = 24  # From so many of them the farthest place of all is looked for, as in `_climb`,
@@ -21,6 +22,9 @@ MOVES = 20  # by so many moves, half as long after each that would lead back.
 AT_ONCE, BACK_AT_ONCE = 1000, 300  # The number of places of the surface, or of the mesh, for a step.
 WAYS = 40  # A place is hidden if rays in this many directions all meet the mesh again.
 LIFT = 1e-4  # They begin this share of the size away from it.
+# The indicator of a surface has at most 200 cells along the object, of which a wall needs three.
+THIN_SHARE = 3.0 / 200.0
+HIDDEN_SHARE = 0.1  # A place is nearly hidden if at most this share of the rays around it meets nothing.
 GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 
 Nearest: TypeAlias = Callable[[Point], tuple[Point, float]]
@@ -169,6 +173,40 @@ def room(surface: DetachedMesh, place: Array, way: Array) -> float:
     start = (place + LIFT * surface.size * way).tolist()
     hit = surface.ray_cast(start, way.tolist(), 2.0 * surface.size)
     return math.inf if hit is None else math.dist(hit[0], place)
+
+
+def why_far(
+    surface: DetachedMesh, place: Array, off: float, patch: core.Reconstruction | None, unit: Unit
+) -> core.Doubt | None:
+    """The doubt about a place (3,) where mesh and surface are `off` apart; None without a cause.
+
+    patch : what was felt nearest to the place, if anything was
+    """
+    foot, normal = (np.array(vector) for vector in surface.project(place.tolist())[:2])
+    narrow = narrowest(surface, foot, normal)
+    words = length(off, unit), length(narrow, unit)
+    if surface.open_edge_distance(place) <= off:
+        code = "open_edges"
+    elif narrow <= THIN_SHARE * surface.size:
+        code = "narrow"
+    elif _free_share(surface, foot, normal) <= HIDDEN_SHARE:
+        code = "hidden"
+    elif patch is not None and surface.is_of_facets(patch):
+        code = "single_facets"
+    else:
+        return None
+    return core.Doubt(code, off, words=words)
+
+
+def narrowest(surface: DetachedMesh, foot: Array, normal: Array) -> float:
+    """How far the next wall is from a place of the mesh, above it or below it."""
+    return min(room(surface, foot, sign * normal) for sign in (-1.0, 1.0))
+
+
+def _free_share(surface: DetachedMesh, foot: Array, normal: Array) -> float:
+    """The share of rays on the outer side of a place of the mesh that meet nothing."""
+    ways = DIRECTIONS[DIRECTIONS @ normal > 0.0]
+    return sum(math.isinf(room(surface, foot, way)) for way in ways) / len(ways)
 
 
 def _directions() -> Array:

@@ -14,7 +14,7 @@ from ...core.triangles import triangle_cross
 from ..touch import units
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Object
-from .farthest_place import THIN_SHARE
+from .both_ways import THIN_SHARE
 from .object_report import FACETED
 from .object_touches import tolerance_of
 

@@ -13,8 +13,8 @@ from ..probes.operators import make_active, report_done, target_object
 from ..probes.probe_operators import TACTILE_OT_add_subdivision
 from ..scene import patch_record
 from ..touch.settings import NOISE, UNSAVED, given, length_property
-from ..touch.types import Outcome
-from . import kept, whole_mesh
+from ..touch.types import Object, Outcome
+from . import whole_mesh
 from .expected import Expected
 from .object_report import object_summary
 from .object_touches import ObjectTouches
@@ -29,6 +29,25 @@ ACCURACIES = [
     ("normal", "Normal", "A tolerance of 1/500 of the object's size"),
     ("fine", "Fine", "A tolerance of 1/1250 of the object's size: many touches"),
 ]
+
+# The ObjectTouches of the last surface by the session_uid of its object; one at most.
+_kept: dict[int, ObjectTouches] = {}
+
+
+def keep(obj: Object, touches: ObjectTouches) -> None:
+    """Keeps the touches that made an object, so that its mesh can be made again without new touches."""
+    forget()
+    _kept[obj.session_uid] = touches
+
+
+def touches_of(obj: Object | None) -> ObjectTouches | None:
+    """The ObjectTouches that made an object, or None if they are no longer there."""
+    return None if obj is None else _kept.get(obj.session_uid)
+
+
+def forget() -> None:
+    """Forgets the touches that are kept."""
+    _kept.clear()
 
 
 class Growing(InSlices):
@@ -134,7 +153,7 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
     def _finish(self, context: bpy.types.Context) -> Outcome:
         target = self._touches.surface.require_same(context)
         made = whole_mesh.insert(context.scene, target.name, self._touches.whole, self._touches.report())
-        kept.keep(made, self._touches)
+        keep(made, self._touches)
         make_active(context, made)
         record = made[patch_record.ATLAS_RECORD].to_dict()
         return report_done(self, object_summary(record), record["status"] == "ok")

@@ -17,8 +17,7 @@ from ..touch.touch_object import AWAY, nearest_point
 from ..touch.touch_report import verdict_report
 from ..touch.types import Array, Object
 from ..touch.units import Unit, length
-from .both_ways import BothWays
-from .farthest_place import narrowest, why_far
+from .both_ways import BothWays, narrowest, why_far
 from .object_report import OFF_TOLERANCES, WITHIN_SHARE, unit_of, within
 from .whole_surface import WholeSurface
 
@@ -90,7 +89,6 @@ class ObjectTouches:
         self.done, self.uncovered = 0, 0
         self.words, self.share = "Looking for a place to begin", 0.0
         self.is_stopped = False
-        self._left = self._spread()
         self._rounds, self._joined, self._is_joining = 0, 0, False  # The joinings, and the touches before.
         self._area = self._faceted = 0.0
 
@@ -126,6 +124,8 @@ class ObjectTouches:
     def steps(self) -> Iterator[None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
         steps, state = self._started()
+        rng = np.random.default_rng(SEED)
+        self._left = core.scattered(self.surface.points, self.surface.triangles, PLACES, rng)[0]
         while True:
             self._note(state)
             yield
@@ -165,13 +165,6 @@ class ObjectTouches:
                 found.append(self.surface.project(middle)[:2])
         most = ROOM * self.surface.size
         return sorted(found, key=lambda place: -min(narrowest(self.surface, *map(np.array, place)), most))
-
-    def _spread(self) -> Array:
-        """Places all over the mesh, (PLACES, 3), of which patches will cover more and more."""
-        with suppress(ValueError):  # No face has an area, so touches cannot begin.
-            rng = np.random.default_rng(SEED)
-            return core.scattered(self.surface.points, self.surface.triangles, PLACES, rng)[0]
-        return np.zeros((0, 3))
 
     def _note(self, state: core.Progress) -> None:
         for exploration, rim in zip(state.found, state.rims, strict=True):

@@ -18,8 +18,8 @@ from ..touch import units
 from ..touch.arrays import read_array
 from ..touch.settings import length_property
 from ..touch.types import Object, Outcome, Point
-from . import kept, whole_mesh
-from .object_operator import EDGE, Growing
+from . import whole_mesh
+from .object_operator import EDGE, Growing, keep, touches_of
 from .object_report import deviation, object_summary, unit_of
 from .object_touches import ObjectTouches
 
@@ -90,7 +90,7 @@ class OnSurface(InSlices):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         hint = "Only the last surface that was touched has its touches in memory"
-        has_touches = polls(cls, kept.touches_of(surface_of(context)), hint)
+        has_touches = polls(cls, touches_of(surface_of(context)), hint)
         return has_touches and is_in_object_mode(cls, context, "Surfaces are made")
 
     def _kept(self, context: bpy.types.Context) -> ObjectTouches:
@@ -98,7 +98,7 @@ class OnSurface(InSlices):
         obj = surface_of(context)
         patch_record.require_colored(obj)
         self._uid, self._name = obj.session_uid, obj.name
-        return kept.touches_of(obj)
+        return touches_of(obj)
 
     def _object(self, context: bpy.types.Context) -> Object:
         """The object of the surface. Raises ValueError, with a sentence, if it is gone or may be edited."""
@@ -114,7 +114,7 @@ class OnSurface(InSlices):
         obj = self._object(context)
         report = self._touches.report() | {"source": obj[patch_record.ATLAS_RECORD]["source"]}
         whole_mesh.rewrite(obj, self._touches.whole, report)
-        kept.keep(obj, self._touches)
+        keep(obj, self._touches)
         record: dict[str, Any] = obj[patch_record.ATLAS_RECORD].to_dict()
         return record
 
