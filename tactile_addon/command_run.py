@@ -18,7 +18,7 @@ from ..core.arguments import many
 from .comparison.register_operator import register_patch
 from .comparison.verification_wording import verification_columns
 from .comparison.verify_operator import verify_patch
-from .files import contact_file, measured, mesh_file, patch_table, whole_file
+from .files import contact_file, export_operators, measured, mesh_file, whole_file
 from .report import report_operator
 from .scene import patch_record
 from .stability_map.map_report import map_table_rows
@@ -124,8 +124,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     """Opens the file, runs the operator, saves, and returns the report."""
     _open(options)
     if options.command == "table":
-        patches = patch_table.patches_of(bpy.context.view_layer.objects)
-        patch_table.write(options.output, patches, bpy.context.scene)
+        patches = export_operators.patches_of(bpy.context.view_layer.objects)
+        export_operators.write_table(options.output, patches, bpy.context.scene)
         return {"rows": len(patches)}
     arguments = _arguments(options)
     before: set[Object] = set(bpy.data.objects)

@@ -204,7 +204,7 @@ def color_bar(extension, put, limit, unit):
     corners = 2 * np.arange(BAR_STEPS)[:, None]
     triangles = np.vstack([corners + corner for corner in ((0, 1, 3), (0, 3, 2))])
     colors = module.scene.colors.diverging(np.repeat(at, 2), 1.0)
-    attributes = [(module.scene.attributes.COLOR, colors)]
+    attributes = [(module.scene.mesh_data.COLOR, colors)]
     strip = bpy.data.meshes.new("Color Bar")
     module.scene.mesh_data.fill(strip, points, triangles, attributes)
     strip.materials.append(bpy.data.materials["Tactile Curvature"])

@@ -10,7 +10,6 @@ import bpy
 from ...core.arguments import many
 from ..touch import units
 from ..touch.touch_report import TouchReport
-from ..touch.units import Unit
 from ..touch.wording import SPREAD, cell
 
 # The results of core.verify, and the largest distance of the patch from the mesh, in the order of a table.
@@ -57,7 +56,7 @@ def verification_columns(report: Mapping[str, Any]) -> list[tuple[str, Any]]:
     ]
 
 
-def verification_table(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, ...]]:
+def verification_table(record: Mapping[str, Any], unit: units.Unit) -> list[tuple[str, ...]]:
     """Rows of a label and the values for the mesh and for the contacts; lengths are without unit."""
     found = record["verification"]
     symbol, bare = units.symbol(1, unit), ("", unit[1])
@@ -73,7 +72,7 @@ def verification_table(record: Mapping[str, Any], unit: Unit) -> list[tuple[str,
     ]
 
 
-def verification_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
+def verification_rows(record: Mapping[str, Any], unit: units.Unit) -> list[tuple[str, str]]:
     """(label, value) of everything else that a verification has found."""
     found = record["verification"]
     return [
@@ -85,7 +84,7 @@ def verification_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, 
     ]
 
 
-def _length(record: Mapping[str, Any], key: str, unit: Unit) -> str:
+def _length(record: Mapping[str, Any], key: str, unit: units.Unit) -> str:
     """A length in words, or a dash if the verification has not found it."""
     found = record["verification"]
     return units.say(units.rounded(found[key], 1, record["radius"]), 1, unit) if key in found else "–"

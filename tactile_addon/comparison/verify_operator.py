@@ -16,7 +16,7 @@ from ..probes import probe, touch_again
 from ..probes.change_handlers import is_pending
 from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, report_done, target_object
-from ..scene import attributes, mesh_data, patch_record, shown
+from ..scene import mesh_data, patch_record, shown
 from ..touch.surface import MeshSurface
 from ..touch.touch_report import TouchReport, judgment
 from ..touch.types import Object, Outcome
@@ -80,11 +80,11 @@ class Verification:
         (patch, _), r, surface = self._objects(), self._r, self._surface
         record = patch[patch_record.RECORD]
         # The object's mesh may have another scale than the patch.
-        points = r.radius / record["radius"] * mesh_data.values(patch.data, attributes.POSITION)
+        points = r.radius / record["radius"] * mesh_data.values(patch.data, mesh_data.POSITION)
         normals = r.geometry.normal(points[:, 0], points[:, 1]) @ r.frame.axes.T
         deviations = surface.deviations(r.frame.to_world(points), normals, r.radius)
         mesh_data.own_mesh(patch)
-        mesh_data.write(patch.data, attributes.DEVIATION, deviations)
+        mesh_data.write(patch.data, mesh_data.DEVIATION, deviations)
         shown.recolor(patch)
         farthest = float(np.abs(deviations).max())
         record["verification"] = {"target": self.target, **self._found, "patch_distance_max": farthest}

@@ -10,6 +10,8 @@ from ... import core
 from ...core import Contacts
 from . import ply_contacts, whole_file
 
+TABLES = (".csv", ".txt", ".tsv")
+
 
 def read(path: str | Path) -> Contacts:
     """The Contacts of a .csv or .ply file, with numbers as they are.
@@ -20,14 +22,12 @@ def read(path: str | Path) -> Contacts:
     path = Path(path)
     if not path.is_file():
         raise OSError(f'there is no file "{path}"')
-    readers = {".csv": _read_csv, ".txt": _read_csv, ".tsv": _read_csv, ".ply": ply_contacts.read}
-    if path.suffix.lower() not in readers:
-        raise OSError(f'cannot read "{path.name}": expected a .csv or .ply file of contacts')
-    try:
-        return readers[path.suffix.lower()](f'"{path.name}"', path)
-    except MemoryError:
-        name = f'"{path.name}"'
-        raise ValueError(f"{name}: expected contacts that fit into memory, got more") from None
+    name, kind = f'"{path.name}"', path.suffix.lower()
+    if kind == ".ply":
+        return ply_contacts.read(name, path)
+    if kind in TABLES:
+        return core.contacts_from_csv(_text(name, path), name)
+    raise OSError(f"cannot read {name}: expected a .csv or .ply file of contacts")
 
 
 def contacts_of(r: core.Reconstruction) -> Contacts:
@@ -46,10 +46,6 @@ def write(path: str | Path, contacts: Contacts) -> None:
 def write_patch(path: str | Path, r: core.Reconstruction) -> None:
     """Writes a reconstruction as JSON, which core.from_dict reads."""
     whole_file.write_text(path, json.dumps(core.to_dict(r), allow_nan=False) + "\n")
-
-
-def _read_csv(name: str, path: Path) -> Contacts:
-    return core.contacts_from_csv(_text(name, path), name)
 
 
 def _text(name: str, path: Path) -> str:

@@ -126,6 +126,9 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
             scale = context.scene.unit_settings.scale_length
             self._contacts = measured.read(self._paths, self.unit, scale, self.whole)
             return super().execute(context) if self.whole else self._patch(context)
+        except MemoryError:
+            error = ValueError("There are more contacts than fit into memory: use fewer of them")
+            return report_error(self, error)
         except (OSError, ValueError) as error:
             return report_error(self, error)
 

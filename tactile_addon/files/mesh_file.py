@@ -197,15 +197,15 @@ def _is_whole_blend(path: Path) -> bool:
 def _size_of_ply(path: Path, mesh: bpy.types.Mesh) -> int:
     """The size that the header of a .ply with the faces of `mesh` promises; huge without a header."""
     with path.open("rb") as file:
-        head, end, _ = file.read(HEADER).partition(b"end_header\n")
-    if not end:
+        head = file.read(HEADER)
+    try:
+        _, elements, below, _ = ply_contacts.header_of("", head)
+    except ValueError:
         return sys.maxsize
-    size, count = len(head) + len(end), 0
-    for words in map(str.split, head.decode("latin-1").splitlines()):
-        if words[0] == "element":
-            count = int(words[2])
-        elif words[:2] == ["property", "list"]:
-            size += count + 4 * len(mesh.loops)
-        elif words[0] == "property":
-            size += count * np.dtype(ply_contacts.PLY_TYPES[words[1]]).itemsize
-    return size
+    # A list begins with its length, and only faces have lists.
+    kinds = [
+        (count, kind if isinstance(kind, str) else kind[0])
+        for _, count, fields in elements
+        for _, kind in fields
+    ]
+    return below + 4 * len(mesh.loops) + sum(count * np.dtype(kind).itemsize for count, kind in kinds)

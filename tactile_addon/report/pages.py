@@ -10,16 +10,14 @@ import numpy as np
 
 from ... import core
 from ..scene import patch_record
-from ..scene.attributes import DEVIATION, HEIGHT_STD, MAP_COLOR, POSITION, REASON
 from ..scene.colors import shades, symmetric_range
-from ..scene.mesh_data import corners_of, values
+from ..scene.mesh_data import DEVIATION, HEIGHT_STD, MAP_COLOR, POSITION, REASON, corners_of, values
 from ..stability_map import map_object
 from ..stability_map.map_report import map_summary, map_table_rows
 from ..stability_map.stability import NOTHING
 from ..touch import units
 from ..touch.arrays import read_array
 from ..touch.types import Array, Object
-from ..touch.units import Unit
 from ..touch.wording import readable_rows, verdict
 from ..whole_object.object_report import object_summary, object_table_rows, unit_of
 from . import page, parts
@@ -49,7 +47,9 @@ def patch_page(patch: Object, r: core.Reconstruction) -> str:
     return page.page(f"{patch.name}: a patch of {record['source']}", sections)
 
 
-def _pictures(patch: Object, r: core.Reconstruction, record: Mapping[str, Any], unit: Unit) -> Iterator[str]:
+def _pictures(
+    patch: Object, r: core.Reconstruction, record: Mapping[str, Any], unit: units.Unit
+) -> Iterator[str]:
     points, corners = values(patch.data, POSITION), corners_of(patch.data)
     contacts = r.contacts[:, :2] * record["radius"] / r.radius  # The object's mesh has this scale.
     for attribute, title, power in SHOWN if _has_mesh(record) else SHOWN[:-1]:
@@ -59,7 +59,7 @@ def _pictures(patch: Object, r: core.Reconstruction, record: Mapping[str, Any], 
         yield page.figure(f"{picture}<br>{scale}", f"{title}, along the normal, with the contacts")
 
 
-def _scale(attribute: str, found: Array, power: int, unit: Unit) -> tuple[float, str]:
+def _scale(attribute: str, found: Array, power: int, unit: units.Unit) -> tuple[float, str]:
     """The range of the colors of values (n,), and a picture of them."""
     limit = symmetric_range(found, parts.LEAST_RANGE)
     low = 0.0 if attribute in patch_record.POSITIVE else -1.0
@@ -115,7 +115,7 @@ def map_page(painted: Object) -> str:
     return page.page(f"{painted.name}: a stability map of {record['source']}", sections)
 
 
-def _legend(painted: Object, record: Mapping[str, Any], unit: Unit) -> str:
+def _legend(painted: Object, record: Mapping[str, Any], unit: units.Unit) -> str:
     """The legend of the colors."""
     shown = painted.tactile_map_colors
     swatches = "".join(page.swatch(color, words) for words, color in map_object.swatches(painted))
@@ -127,7 +127,7 @@ def _legend(painted: Object, record: Mapping[str, Any], unit: Unit) -> str:
     return page.words(f"{title}: pale green at {low}, dark red from {high} on.") + swatches
 
 
-def _errors(painted: Object, record: Mapping[str, Any], unit: Unit) -> list[str]:
+def _errors(painted: Object, record: Mapping[str, Any], unit: units.Unit) -> list[str]:
     """The sections on errors, in which each touch counts by the area that has its color."""
     found = painted[map_object.VALUES]
     errors, stds, weights = (np.array(found[name]) for name in ("error", HEIGHT_STD, map_object.AREA))

@@ -13,13 +13,11 @@ import bpy
 import numpy as np
 
 from ...core.triangles import triangle_cross
-from ..scene.attributes import POSITION
 from ..scene.colors import symmetric_range
-from ..scene.mesh_data import corners_of, values
+from ..scene.mesh_data import POSITION, corners_of, values
 from ..touch import units
 from ..touch.arrays import read_array
 from ..touch.types import Array
-from ..touch.units import Unit
 from . import page
 
 SHARES = (0.005, 0.01, 0.02, 0.05)  # The bands, as shares of the radius of a patch or the extent of a map.
@@ -45,7 +43,7 @@ def deviations(
     off: Array,
     weights: Array,
     std: float,
-    unit: Unit,
+    unit: units.Unit,
     reaches: Sequence[tuple[str, float]],
     caption: str,
 ) -> list[str]:
@@ -61,7 +59,9 @@ def shares_of(length: float, what: str) -> list[tuple[str, float]]:
     return [(f"± {100.0 * share:g} % of the {what}", share * length) for share in SHARES]
 
 
-def bands(off: Array, weights: Array, std: float, unit: Unit, reaches: Sequence[tuple[str, float]]) -> str:
+def bands(
+    off: Array, weights: Array, std: float, unit: units.Unit, reaches: Sequence[tuple[str, float]]
+) -> str:
     """The shares of the weights (n,) within named lengths, and within one to three standard deviations."""
 
     def row(name: str, reach: float, due: str = "") -> tuple[str, ...]:
@@ -78,7 +78,7 @@ def bands(off: Array, weights: Array, std: float, unit: Unit, reaches: Sequence[
     return page.table(rows, ("band", "", "within it", "expected, if normal"))
 
 
-def ending(rows: Iterable[tuple[str, str]], record: Mapping[str, Any], unit: Unit) -> list[str]:
+def ending(rows: Iterable[tuple[str, str]], record: Mapping[str, Any], unit: units.Unit) -> list[str]:
     """The sections at the end of a page: what was found, as rows, and how."""
     return [
         page.section("What was found", page.table(rows)),
@@ -87,12 +87,12 @@ def ending(rows: Iterable[tuple[str, str]], record: Mapping[str, Any], unit: Uni
     ]
 
 
-def label(power: int, unit: Unit) -> Callable[[float], str]:
+def label(power: int, unit: units.Unit) -> Callable[[float], str]:
     """A function that gives a value in length^power in words."""
     return lambda value: units.say(value, power, unit) if value else "0"
 
 
-def _settings(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
+def _settings(record: Mapping[str, Any], unit: units.Unit) -> list[tuple[str, str]]:
     """(label, value) of the settings that a record has."""
     names = ("method", "degree", "tolerance", "most", "spacing", "extent", "step", "noise", "seed")
     rows = [(WORDS.get(name, name), _setting(name, record[name], unit)) for name in names if name in record]
@@ -100,7 +100,7 @@ def _settings(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     return [*rows, *([("planes", ", ".join(planes))] if planes else [])]
 
 
-def _setting(name: str, value: Any, unit: Unit) -> str:
+def _setting(name: str, value: Any, unit: units.Unit) -> str:
     if name in CHOSEN and not value:
         return "auto"
     return units.say(value, 1, unit) if name in LENGTHS else str(value)

@@ -12,10 +12,23 @@ from mathutils import Matrix
 from ... import core
 from ..touch.touch_object import Touched
 from ..touch.types import Array, Object
-from .attributes import COLOR, DEVIATION, GAUSSIAN_STD, HEIGHT_STD, NORMAL, PLACE, POSITION
 from .curves import CURVES, curves_of
 from .family import add
-from .mesh_data import ABOVE, emission, fill, own_mesh, values, write
+from .mesh_data import (
+    ABOVE,
+    COLOR,
+    DEVIATION,
+    GAUSSIAN_STD,
+    HEIGHT_STD,
+    NORMAL,
+    PLACE,
+    POSITION,
+    emission,
+    fill,
+    own_mesh,
+    values,
+    write,
+)
 from .patch_record import (
     QUANTITIES_OF_A_FIT,
     RECONSTRUCTION,

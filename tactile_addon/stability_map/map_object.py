@@ -11,8 +11,18 @@ from mathutils import Matrix, Vector
 
 from ... import core
 from ..scene import colors, patch_object, patch_record
-from ..scene.attributes import CORNERS, HEIGHT_STD, MAP_COLOR, MEASURES, REASON, TOUCH
-from ..scene.mesh_data import ABOVE, emission, fill, write
+from ..scene.mesh_data import (
+    ABOVE,
+    CORNERS,
+    HEIGHT_STD,
+    MAP_COLOR,
+    MEASURES,
+    REASON,
+    TOUCH,
+    emission,
+    fill,
+    write,
+)
 from ..scene.shown import LEAST_LENGTH
 from ..scene.viewports import show_colors
 from ..touch.arrays import read_array
@@ -48,8 +58,7 @@ MAP_QUANTITIES = [
     ("blind_share", "Blind Share", "Share of the ways to bend that the planes cannot show", 0),
 ]
 LOGARITHMIC = ("condition_number",)  # These have a logarithmic scale from 1.
-# The range reaches at least to where the typical patch, that of the median by area, would be in doubt: this
-# multiple of that quantity.
+# The range reaches at least to where the median patch would be in doubt: this multiple of that quantity.
 DOUBTFUL = {"error": (core.CONTRADICTING, HEIGHT_STD), HEIGHT_STD: (core.DOUBTFUL_STD, "reach")}
 REVERSED = ("reach",)  # Of these much is good, so that red is little: red is bad on every map.
 MAP_POWERS = {name: power for name, _, _, power in MAP_QUANTITIES}
@@ -108,7 +117,7 @@ def recolor(painted: Object) -> None:
     if shown == REASON:
         rgba, limit = colors.linear(REASON_COLORS)[values.astype(np.intp)], len(REASON_KEYS) - 1.0
     else:
-        limit = _limit(shown, values[values != NOTHING], _least_range(painted, shown))
+        limit = _limit(painted, shown, values[values != NOTHING])
         table = colors.diverging(np.arange(SHADES), SHADES - 1)
         table = np.vstack([table, colors.linear([REFUSED])])
         share = np.maximum(values, 1.0 if shown in LOGARITHMIC else 0.0)
@@ -121,24 +130,15 @@ def recolor(painted: Object) -> None:
     record["color_limit"] = limit
 
 
-def _limit(shown: str, values: Array, floor: float) -> float:
-    """The end of the colors' range."""
+def _limit(painted: Object, shown: str, values: Array) -> float:
+    """The end of the colors' range for values (n,), such that red stands for what is bad."""
     if shown == "blind_share":
         return 1.0
-    return colors.symmetric_range(values, floor)
-
-
-def _least_range(painted: Object, shown: str) -> float:
-    """The smallest range of colors of a quantity, so that red stands for what is bad."""
     if shown in LOGARITHMIC:
-        return 10.0
-    least = LEAST_LENGTH * painted[patch_record.MAP_RECORD]["spacing"]
-    times, other = DOUBTFUL.get(shown, (0.0, shown))
-    values = np.array(painted[VALUES][other])
-    order = np.argsort(values)
-    areas = np.cumsum(np.where(values == NOTHING, 0.0, painted[VALUES][AREA])[order])
-    median = float(values[order[np.searchsorted(areas, 0.5 * areas[-1])]])
-    return max(least, times * median) if areas[-1] else least
+        return colors.symmetric_range(values, 10.0)
+    record, (times, other) = painted[patch_record.MAP_RECORD], DOUBTFUL.get(shown, (0.0, shown))
+    least = max(LEAST_LENGTH * record["spacing"], times * record.get(f"{other}_median", 0.0))
+    return colors.symmetric_range(values, least)
 
 
 def swatches(painted: Object) -> list[tuple[str, tuple[float, ...]]]:

@@ -9,7 +9,6 @@ import bpy
 
 from ...core.arguments import many
 from ..touch import units
-from ..touch.units import Unit
 from ..touch.wording import fit
 from . import map_object
 from .stability import REASONS
@@ -49,7 +48,7 @@ def _refused(record: Mapping[str, Any]) -> list[str]:
     return [f"{count} {names[key]}" for key, count in record["refused"].items() if count]
 
 
-def map_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
+def map_rows(record: Mapping[str, Any], unit: units.Unit) -> list[tuple[str, str]]:
     """(label, value) of how many patches a stability map has, and of the reasons why there are not more."""
     names, refused = {key: name for key, name, _ in REASONS}, [*record["refused"].items()]
     return [
@@ -76,7 +75,7 @@ def facets(record: Mapping[str, Any]) -> str | None:
     return f"Curvature of the facets, not of the shape, at {many(count, 'point', 'points')}"
 
 
-def median_rows(record: Mapping[str, Any], unit: Unit) -> Iterator[tuple[str, str]]:
+def median_rows(record: Mapping[str, Any], unit: units.Unit) -> Iterator[tuple[str, str]]:
     """(label, value) of the medians over the patches of a stability map that are known."""
     for name, title, _, power in map_object.MAP_QUANTITIES:
         if f"{name}_median" in record:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ... import core
 from ...core.triangles import triangle_cross
-from ..scene.attributes import MEASURES
+from ..scene.mesh_data import MEASURES
 from ..touch.arrays import read_array
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.evaluated_mesh import evaluated_object, size_of
@@ -271,24 +271,11 @@ def _cut(surface: DetachedMesh, longest: float) -> tuple[Array, Array, Array]:
         owners = np.concatenate([owners[~large], owners[large], owners[large]])
 
 
-class _Plane:
-    """The plane z = 0 as a surface."""
-
-    def ray_cast(
-        self, origin: Sequence[float], direction: Sequence[float], distance: float
-    ) -> tuple[Sequence[float], Sequence[float]] | None:
-        """The point and the normal where a ray meets the plane, or None, as core asks of a Surface."""
-        if direction[2] == 0.0 or not 0.0 <= -origin[2] / direction[2] <= distance:
-            return None
-        gone = -origin[2] / direction[2]
-        return tuple(a + gone * b for a, b in zip(origin, direction, strict=True)), (0.0, 0.0, 1.0)
-
-
 def _rehearse(
     planes: Sequence[core.SamplingPlane], fit: Mapping[str, Any], extent: float, step: float
 ) -> None:
     """Raises ValueError for settings that cannot even rebuild a plane: all touches would be refused."""
-    origin, up = np.zeros(3), (0.0, 0.0, 1.0)
-    core.reconstruct(
-        origin, core.track(_Plane(), origin, up, planes, extent=extent, step=step), outward=up, **fit
-    )
+    up, along = (0.0, 0.0, 1.0), np.arange(-extent, extent + 0.5 * step, step)
+    axes = [plane.axes(up) for plane in planes]
+    contours = [core.Contour(np.outer(along, a[:, 0]), plane_normal=a[:, 2]) for a in axes]
+    core.reconstruct(np.zeros(3), contours, outward=up, **fit)

@@ -12,8 +12,7 @@ from mathutils import Vector
 from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import is_in_object_mode, make_active, polls, report_done, report_error, surface_of
 from ..scene import patch_record
-from ..scene.attributes import DEVIATION
-from ..scene.mesh_data import own_mesh, values
+from ..scene.mesh_data import DEVIATION, own_mesh, values
 from ..touch import units
 from ..touch.arrays import read_array
 from ..touch.settings import length_property

@@ -4,7 +4,6 @@
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
 import bpy
@@ -13,8 +12,18 @@ from mathutils import Matrix
 
 from ... import core
 from ..scene import colors, patch_object, patch_record, undo
-from ..scene.attributes import COLOR, CORNERS, DEVIATION, HEIGHT_STD, NODE
-from ..scene.mesh_data import ABOVE, emission, fill, own_mesh, write
+from ..scene.mesh_data import (
+    ABOVE,
+    COLOR,
+    CORNERS,
+    DEVIATION,
+    HEIGHT_STD,
+    NODE,
+    emission,
+    fill,
+    own_mesh,
+    write,
+)
 from ..scene.shown import bend_range, recolor
 from ..scene.viewports import show_colors, show_size
 from ..touch.detached_mesh import DetachedMesh
@@ -22,8 +31,8 @@ from ..touch.types import Array, Object
 from .whole_surface import WholeSurface
 
 SHARP = math.radians(30.0)  # Edges at which faces are turned by more are creases.
-# While a patch is one of many, it is drawn with these rings, the last of which is its dark rim, and spokes.
-RINGS, SPOKES = (0.25, 0.5, 0.75, 0.95, 1.0), 48
+# While a patch is one of many, it is drawn with these rings, from its middle to its dark rim, and spokes.
+RINGS, SPOKES = (0.0, 0.25, 0.5, 0.75, 0.95, 1.0), 48
 RIM_COLOR = (0.02, 0.02, 0.02, 1.0)
 # It is drawn no lower than the mesh, above that by this share of the object's size, or of its own if that is
 # less, and above patches that it overlaps by as much, up to so many times.
@@ -66,7 +75,7 @@ class GrowingPatches:
             certain = max(abs(r.k1) - r.k1_std, abs(r.k2) - r.k2_std, 0.0)
             self._bends.append((certain, np.mean(rim**2)))
         points, mean_curvatures = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
-        count = 1 + SPOKES * len(RINGS)
+        count = SPOKES * len(RINGS)
         triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
         bends, areas = np.transpose(self._bends)
         shades = colors.diverging(mean_curvatures, bend_range(bends, areas, self._size))
@@ -101,7 +110,7 @@ def _disk(r: core.Reconstruction, rim: Array) -> tuple[Array, Array, Array]:
     """
     angles = np.linspace(0.0, 2.0 * np.pi, SPOKES, endpoint=False)
     edge = rim[:: len(rim) // SPOKES, None] * np.column_stack([np.cos(angles), np.sin(angles)])
-    x, y = np.vstack([np.zeros((1, 2)), *(share * edge for share in RINGS)]).T
+    x, y = np.vstack([share * edge for share in RINGS]).T
     d = r.geometry.derivatives(x, y)
     points = r.frame.to_world(np.column_stack([x, y, d.z]))
     mean_curvature = r.patch.mean_curvature(x, y)
@@ -122,15 +131,9 @@ def _below(surface: DetachedMesh, points: Array, normals: Array) -> Array:
 
 def _fan() -> Array:
     """The triangles (m, 3) between the points of a disk."""
-    a, b = np.arange(SPOKES), np.roll(np.arange(SPOKES), -1)
-    rings = [(1 + SPOKES * i + a, 1 + SPOKES * i + b) for i in range(len(RINGS))]
-    parts = [np.column_stack([np.zeros_like(a), *rings[0]])]
-    for (inner, inner_next), (outer, outer_next) in pairwise(rings):
-        parts += [
-            np.column_stack([inner, outer, outer_next]),
-            np.column_stack([inner, outer_next, inner_next]),
-        ]
-    return np.vstack(parts)
+    inner = np.arange(SPOKES * (len(RINGS) - 1)).reshape(-1, SPOKES)
+    a, b = inner.ravel(), np.roll(inner, -1, axis=1).ravel()
+    return np.vstack([np.column_stack([a, a + SPOKES, b + SPOKES]), np.column_stack([a, b + SPOKES, b])])
 
 
 def insert(scene: bpy.types.Scene, name: str, whole: WholeSurface, report: dict[str, Any]) -> Object:

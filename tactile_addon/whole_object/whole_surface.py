@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ... import core
-from ...core.atlas.connectivity import connected_pieces
 from ...core.steps import part_of
 from ..touch.touch_report import verdict_report
 from ..touch.types import Array
@@ -101,6 +100,10 @@ def _edge(mesh: core.Mesh) -> float:
 
 def _rims(mesh: core.Mesh) -> int:
     """The number of rims of a mesh: where its object ends, and around holes."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
     ends, index = np.unique(mesh.border, return_inverse=True)
     a, b = index.reshape(-1, 2).T
-    return connected_pieces(a, b, len(ends))[0] if len(ends) else 0
+    links = coo_matrix((np.ones(len(a)), (a, b)), (len(ends),) * 2)
+    return connected_components(links)[0] if len(ends) else 0
