@@ -29,7 +29,7 @@ class Stage:
         self.mesh_data, self.scene = extension.tactile_addon.scene.mesh_data, scene
 
     def ink(self, name):
-        return self.mesh_data.emission(name, color=INKS[name])
+        return demo.plain_material(name, INKS[name])
 
     def add(self, name, data, material=None):
         import bpy

@@ -82,21 +82,21 @@ def add(path: Path, empty: bool = False) -> list[Object]:
 def _require_readable(path: Path) -> None:
     """Raises OSError for a file that would end Blender, or of which Blender would read something else."""
     try:
-        wrong = _unreadable_vertices(path)
+        is_wild = _has_wild_vertices(path)
     except ValueError as error:
         raise _unreadable(path) from error
-    if wrong:
+    if is_wild:
         raise OSError(
-            f'"{path.name}" has vertices whose coordinates are not finite in single precision, {wrong} of '
-            "them: correct or delete these"
+            f'"{path.name}" has vertices whose coordinates are not finite in single precision: correct or '
+            "delete these"
         )
 
 
-def _unreadable_vertices(path: Path) -> int:
-    """The number of vertices in a .ply, .stl or .obj file whose coordinates are no finite float32 numbers.
+def _has_wild_vertices(path: Path) -> bool:
+    """Whether a .ply, .stl or .obj file has vertices whose coordinates are no finite float32 numbers.
 
-    It is 0 for a .stl or .obj file that is broken otherwise, which importers find. Raises ValueError for a
-    .ply file of whose vertices an importer might read something else.
+    It has none if it is a .stl or .obj file that is broken otherwise, which importers find. Raises ValueError
+    for a .ply file of whose vertices an importer might read something else.
     """
     data = path.read_bytes()
     if path.suffix.lower() == ".ply":
@@ -104,51 +104,42 @@ def _unreadable_vertices(path: Path) -> int:
     try:
         return {".stl": _of_stl, ".obj": _of_obj}[path.suffix.lower()](data)
     except (ValueError, IndexError):
-        return 0
+        return False
 
 
-def _of_ply(data: bytes) -> int:
+def _of_ply(data: bytes) -> bool:
     rows, fields, is_text = ply_contacts.vertex_rows("", data)
     lines = np.frombuffer(data, np.uint8, len(data) if is_text else data.find(b"end_header"))
     if np.diff(np.flatnonzero(lines == ord("\n")), prepend=-1, append=len(lines)).max() > PLY_LINE:
         raise ValueError
     if not is_text:
-        return _of_numbers(np.stack([rows[key] for key in POINT_COLUMNS], axis=1))
+        return _are_wild(np.stack([rows[key] for key in POINT_COLUMNS], axis=1))
     names = [name for name, _ in fields]
     return _of_lines(rows, [names.index(key) for key in POINT_COLUMNS])
 
 
-def _of_stl(data: bytes) -> int:
+def _of_stl(data: bytes) -> bool:
     triangles = int.from_bytes(data[STL_HEAD - 4 : STL_HEAD], "little")
     if len(data) == STL_HEAD + triangles * STL_TRIANGLE.itemsize:
-        return _of_numbers(np.frombuffer(data, STL_TRIANGLE, triangles, STL_HEAD)["corners"].reshape(-1, 3))
+        return _are_wild(np.frombuffer(data, STL_TRIANGLE, triangles, STL_HEAD)["corners"])
     return _of_lines([line for line in data.splitlines() if line.lstrip().startswith(b"vertex")], AFTER_WORD)
 
 
-def _of_obj(data: bytes) -> int:
+def _of_obj(data: bytes) -> bool:
     lines = map(bytes.lstrip, data.replace(b"\\\n", b" ").splitlines())  # A backslash continues a line.
     return _of_lines([line for line in lines if line.startswith((b"v ", b"v\t"))], AFTER_WORD)
 
 
-def _of_lines(lines: Sequence[bytes], places: Sequence[int]) -> int:
-    """The number of lines without three finite numbers at these places."""
+def _of_lines(lines: Sequence[bytes], places: Sequence[int]) -> bool:
+    """Whether any line has not three finite numbers at these places."""
     try:
-        return _of_numbers(np.loadtxt(lines, usecols=places, comments=None, ndmin=2)) if lines else 0
+        return bool(lines) and _are_wild(np.loadtxt(lines, usecols=places, comments=None, ndmin=2))
     except ValueError:  # Some line has a word in place of a number.
-        return sum(_is_bad(line.split(None, max(places) + 1), places) for line in lines)
-
-
-def _is_bad(words: Sequence[bytes], places: Sequence[int]) -> bool:
-    try:
-        row = [words[place] for place in places]
-        # Only Python takes 1_0 for 10.
-        return any(b"_" in word for word in row) or _of_numbers(np.array([list(map(float, row))])) > 0
-    except (ValueError, IndexError):
         return True
 
 
-def _of_numbers(points: Array) -> int:
-    return int(np.count_nonzero(~(np.abs(points) <= LARGEST).all(axis=1)))  # NaN fails every comparison.
+def _are_wild(points: Array) -> bool:
+    return not (np.abs(points) <= LARGEST).all()  # NaN fails every comparison.
 
 
 def _unreadable(path: Path) -> OSError:

@@ -29,21 +29,3 @@ def shades(values: ArrayLike, limit: float) -> Array:
         [np.interp(at, np.linspace(-1.0, 1.0, len(COLOR_STOPS)), stop) for stop in COLOR_STOPS.T]
     )
     return np.column_stack([srgb, np.ones(len(srgb))])
-
-
-def diverging(values: ArrayLike, limit: float, unknown: ArrayLike = ()) -> Array:
-    """The colors of shades(), but as linear RGBA (n, 4), as Blender stores them.
-
-    unknown : (k,), indices of values that are not known, which get the gray UNKNOWN instead
-    """
-    rgba = shades(values, limit)
-    rgba[np.asarray(unknown, dtype=int)] = UNKNOWN
-    return linear(rgba)
-
-
-def linear(rgba: ArrayLike) -> Array:
-    """The linear RGBA of colors in sRGB, (n, 4)."""
-    rgba = np.array(rgba)
-    srgb = rgba[:, :3]
-    rgba[:, :3] = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-    return rgba

@@ -36,7 +36,7 @@ KEYS = {
     "FLOAT": "value",
     "INT": "value",
     "FLOAT_VECTOR": "vector",
-    "FLOAT_COLOR": "color",
+    "FLOAT_COLOR": "color_srgb",
 }
 ABOVE = "tactile_above"  # A custom property of objects: how far above its mesh it is drawn.
 
@@ -100,56 +100,31 @@ def corners_of(mesh: bpy.types.Mesh) -> Array:
     return read_array(mesh.loops, "vertex_index", dtype=np.int32).reshape(-1, 3)
 
 
-def emission(
-    name: str,
-    attribute: str | None = None,
-    color: Sequence[float] = (1.0, 1.0, 1.0, 1.0),
-    upright: bool = False,
-) -> bpy.types.Material:
-    """The material of this name, made if missing, which shows a color attribute or one color as it is.
+def emission(name: str, attribute: str) -> bpy.types.Material:
+    """The material of this name, made if missing, which shows a color attribute as it is.
 
-    Eevee and Cycles draw what has it above the mesh in which it lies, by the object's length ABOVE: along its
-    normals, or upright, which is along the object's z, as a patch is. Solid shading
-    draws it in front instead, or viewport/above does. None of these changes its geometry.
+    Eevee and Cycles draw what has it above the mesh in which it lies, along its normals, by the object's
+    length ABOVE. Solid shading draws it in front instead, or viewport/above does. None of these changes its
+    geometry.
     """
     material: Any = bpy.data.materials.get(name)
-    if material is None:
-        material = bpy.data.materials.new(name)
-        if material.node_tree is None:  # Blender 4.5 needs this; later ones deprecate it.
-            material.use_nodes = True
-        material.diffuse_color = color
-        nodes, links = material.node_tree.nodes, material.node_tree.links
-        nodes.clear()
-        emission = nodes.new("ShaderNodeEmission")
-        output = nodes.new("ShaderNodeOutputMaterial")
-        links.new(emission.outputs["Emission"], output.inputs["Surface"])
-        if attribute is None:
-            emission.inputs["Color"].default_value = color
-        else:
-            source = nodes.new("ShaderNodeVertexColor")
-            source.layer_name = attribute
-            links.new(source.outputs["Color"], emission.inputs["Color"])
-        output.location, emission.location = (200, 0), (0, 0)
-        _draw_above(material, output, upright)
-    return material
-
-
-def _draw_above(material: bpy.types.Material, output: bpy.types.Node, upright: bool) -> None:
-    """Moves what has the material along its normals, or upright, where it is drawn, by the length ABOVE."""
+    if material is not None:
+        return material
+    material = bpy.data.materials.new(name)
+    if material.node_tree is None:  # Blender 4.5 needs this; later ones deprecate it.
+        material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
-    length: Any = nodes.new("ShaderNodeAttribute")
-    length.attribute_type, length.attribute_name = "OBJECT", ABOVE
-    move: Any
-    if upright:
-        move, along = nodes.new("ShaderNodeVectorDisplacement"), nodes.new("ShaderNodeCombineXYZ")
-        move.space = "OBJECT"
-        links.new(length.outputs["Fac"], along.inputs["Z"])
-        links.new(along.outputs["Vector"], move.inputs["Vector"])
-        along.location = (-100, -350)
-    else:
-        move = nodes.new("ShaderNodeDisplacement")
-        links.new(length.outputs["Fac"], move.inputs["Height"])
+    nodes.clear()
+    output, emission = nodes.new("ShaderNodeOutputMaterial"), nodes.new("ShaderNodeEmission")
+    source, height = nodes.new("ShaderNodeVertexColor"), nodes.new("ShaderNodeAttribute")
+    move = nodes.new("ShaderNodeDisplacement")
+    source.layer_name = attribute
+    height.attribute_type, height.attribute_name = "OBJECT", ABOVE
     move.inputs["Midlevel"].default_value, move.inputs["Scale"].default_value = 0.0, 1.0
+    links.new(source.outputs["Color"], emission.inputs["Color"])
+    links.new(emission.outputs["Emission"], output.inputs["Surface"])
+    links.new(height.outputs["Fac"], move.inputs["Height"])
     links.new(move.outputs["Displacement"], output.inputs["Displacement"])
     material.displacement_method = "DISPLACEMENT"
-    move.location, length.location = (0, -200), (-200, -200)
+    output.location, move.location, height.location = (200, 0), (0, -200), (-200, -200)
+    return material

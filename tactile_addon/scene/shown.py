@@ -39,10 +39,9 @@ def recolor(obj: Object) -> None:
     own_mesh(obj)
     shown, mesh, record = obj.tactile_colors, obj.data, _record(obj)
     limit = obj.get(RANGE) or _automatic_range(obj, record, shown)
-    shades = values(mesh, shown)
-    rgba = colors.diverging(np.append(shades, 0.0), limit, [len(shades)])
-    at = np.arange(len(shades)) if RECORD in obj else _corners_shown(mesh, shown, record["edge"])
-    mesh.attributes[COLOR].data.foreach_set("color", rgba[at].ravel())
+    rgba = np.vstack([colors.shades(values(mesh, shown), limit), colors.UNKNOWN])
+    at = np.arange(len(mesh.vertices)) if RECORD in obj else _corners_shown(mesh, shown, record["edge"])
+    mesh.attributes[COLOR].data.foreach_set("color_srgb", rgba[at].ravel())
     record["is_gray"] = bool((at < 0).any())
     if mesh.color_attributes.active_color_name != COLOR or mesh.color_attributes.default_color_name != COLOR:
         mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR

@@ -30,7 +30,6 @@ from ..touch.settings import MOST_PLANES
 from ..touch.types import Array, Object
 from .stability import NOTHING, REASON_KEYS, REASONS, StabilityMap
 
-SHADES = 256
 PLACES = "tactile_places"  # The points that were touched, in the axes of the map: three numbers each,
 VALUES = "tactile_values"  # and what was found there, by the names of the attributes, with
 AREA = "area"  # the area in the world that has the color of each.
@@ -83,7 +82,7 @@ def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Ob
     # because patches that lie in it are.
     painted[ABOVE] = SHOWN_ABOVE * float(np.linalg.norm(np.ptp(touched.points, axis=0)))
     painted[PLACES] = np.ravel(touched.places[: touched.done]).tolist()
-    mesh.materials.append(emission("Tactile Stability", attribute=MAP_COLOR))
+    mesh.materials.append(emission("Tactile Stability", MAP_COLOR))
     painted[VALUES] = {name: touched.measures[name].tolist() for name in MEASURES}
     painted[VALUES].update({REASON: touched.reason.tolist(), AREA: areas.tolist()})
     painted[patch_record.MAP_RECORD] = touched.report() | {"source": obj.name, "painted": painted.name}
@@ -111,21 +110,19 @@ def _paint(mesh: bpy.types.Mesh, touched: StabilityMap) -> Array:
 def recolor(painted: Object) -> None:
     """Colors the map by the quantity that it is set to show, and keeps the range in its record."""
     shown, mesh, record = painted.tactile_map_colors, painted.data, painted[patch_record.MAP_RECORD]
-    values = np.array(painted[VALUES][shown])[
-        read_array(mesh.attributes[TOUCH].data, "value", dtype=np.int32)
-    ]
+    found = np.array(painted[VALUES][shown])
     if shown == REASON:
-        rgba, limit = colors.linear(REASON_COLORS)[values.astype(np.intp)], len(REASON_KEYS) - 1.0
+        rgba, limit = REASON_COLORS[found.astype(np.intp)], len(REASON_KEYS) - 1.0
     else:
-        limit = _limit(painted, shown, values[values != NOTHING])
-        table = colors.diverging(np.arange(SHADES), SHADES - 1)
-        table = np.vstack([table, colors.linear([REFUSED])])
-        share = np.maximum(values, 1.0 if shown in LOGARITHMIC else 0.0)
-        share = np.log(share) / np.log(limit) if shown in LOGARITHMIC else share / limit
-        share = np.minimum(share, 1.0)
-        place = ((1.0 - share if shown in REVERSED else share) * (SHADES - 1) + 0.5).astype(np.int32)
-        rgba = table[np.where(values == NOTHING, SHADES, place)]
-    mesh.attributes[MAP_COLOR].data.foreach_set("color", rgba.astype(np.float32).ravel())
+        limit = _limit(painted, shown, found[found != NOTHING])
+        share = found / limit
+        if shown in LOGARITHMIC:
+            share = np.log(np.maximum(found, 1.0)) / np.log(limit)
+        share = np.clip(share, 0.0, 1.0)
+        rgba = colors.shades(1.0 - share if shown in REVERSED else share, 1.0)
+        rgba[found == NOTHING] = REFUSED
+    touch = read_array(mesh.attributes[TOUCH].data, "value", dtype=np.int32)
+    mesh.attributes[MAP_COLOR].data.foreach_set("color_srgb", rgba[touch].ravel())
     mesh.update()
     record["color_limit"] = limit
 

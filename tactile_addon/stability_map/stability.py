@@ -27,7 +27,7 @@ MOST_TOUCHES = 1_000_000  # They take hours, and the places among which they are
 TRIED_SPACING = 1.0 / 4.0  # Touches that are timed are so far apart, as a share of the object's size.
 BATCH = 20  # The number of touches that are fitted at once, in some hundredths of a second.
 GROWING_BATCH = 4  # Touches that choose their extent are fewer, because their fits have more contacts.
-NEAREST_AT_ONCE = 10_000  # The number of vertices that get their nearest touch at once.
+NEAREST_AT_ONCE = 10_000  # The number of triangles or vertices that get their nearest touch at once.
 NOTHING = -1.0  # Each quantity has this value where there is no patch.
 # The values of the attribute `reason`: key, name, and the stop of a curve that it follows from.
 REASONS = [
@@ -76,8 +76,8 @@ class StabilityMap:
     measures, reason : (n,), what was found by each touch; the fields of `measures` are MEASURES
     points, triangles, owners : (k, 3), (m, 3) and (m,), the mesh that is painted, and its triangles' faces
     areas : those of the triangles
-    touch_in : index of the touch nearest to the middle of each triangle, once the steps are done
-    touch_of : that of the largest triangle at each vertex, or the nearest to a vertex without faces
+    touch_in, touch_of : the indices of the touches nearest to the middle of each triangle and to each vertex,
+        once the steps are done
     """
 
     def __init__(
@@ -151,17 +151,14 @@ class StabilityMap:
         from scipy.spatial import cKDTree
 
         tree = cKDTree(self.places[: self.done])
-        self.touch_in = np.empty(len(self._middles), dtype=np.intp)
-        for start in range(0, len(self._middles), NEAREST_AT_ONCE):
-            some = slice(start, start + NEAREST_AT_ONCE)
-            self.touch_in[some] = tree.query(self._middles[some])[1]
-            yield
-        # Touches in narrow faces would color wide ones that share all vertices with them, as on a plate.
-        self.touch_of = np.full(len(self.points), -1)
-        order = np.argsort(self.areas, kind="stable")
-        self.touch_of[self.triangles[order].ravel()] = np.repeat(self.touch_in[order], 3)
-        loose = self.touch_of < 0
-        self.touch_of[loose] = tree.query(self.points[loose])[1]
+        self.touch_in, self.touch_of = (
+            np.empty(len(at), dtype=np.intp) for at in (self._middles, self.points)
+        )
+        for nearest, places in ((self.touch_in, self._middles), (self.touch_of, self.points)):
+            for start in range(0, len(places), NEAREST_AT_ONCE):
+                some = slice(start, start + NEAREST_AT_ONCE)
+                nearest[some] = tree.query(places[some])[1]
+                yield
 
     def _touch(self, numbers: Sequence[int]) -> Iterator[None]:
         """Makes the touches with these numbers, as a generator like `steps`."""
@@ -275,7 +272,7 @@ def _rehearse(
     planes: Sequence[core.SamplingPlane], fit: Mapping[str, Any], extent: float, step: float
 ) -> None:
     """Raises ValueError for settings that cannot even rebuild a plane: all touches would be refused."""
-    up, along = (0.0, 0.0, 1.0), np.arange(-extent, extent + 0.5 * step, step)
+    up, steps = (0.0, 0.0, 1.0), np.arange(-(extent // step), extent // step + 1)
     axes = [plane.axes(up) for plane in planes]
-    contours = [core.Contour(np.outer(along, a[:, 0]), plane_normal=a[:, 2]) for a in axes]
+    contours = [core.Contour(np.outer(step * steps, a[:, 0]), plane_normal=a[:, 2]) for a in axes]
     core.reconstruct(np.zeros(3), contours, outward=up, **fit)

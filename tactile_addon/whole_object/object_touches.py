@@ -27,9 +27,7 @@ LARGEST_TOLERANCE, LARGEST_EDGE = 0.1, 0.5  # With more, neither patches nor tri
 STARTS = 20  # The number of places to begin that are tried, besides the one that is given.
 ROOM = 0.05  # Places with this share of the size of room are tried first.
 PLACES, SEED = 1000, 0  # The progress is the share of this many places on the mesh that patches cover.
-# Of all that is to be done, touching and joining are done at these shares; of touching and joining again,
-# touching is done at the last one.
-TOUCHED, JOINED, AGAIN = 0.5, 0.8, 0.3
+TOUCHED, JOINED = 0.5, 0.8  # Of all that is to be done, touching and joining are done at these shares.
 
 
 class ObjectTouches:
@@ -89,7 +87,8 @@ class ObjectTouches:
         self.done, self.uncovered = 0, 0
         self.words, self.share = "Looking for a place to begin", 0.0
         self.is_stopped = False
-        self._rounds, self._joined, self._is_joining = 0, 0, False  # The joinings, and the touches before.
+        # How often it has begun to join or to touch again, and the number of touches before.
+        self._phases, self._before, self._is_joining = 0, 0, False
         self._area = self._faceted = 0.0
 
     def _require_lengths(self, noise: float, edge: float) -> None:
@@ -178,28 +177,25 @@ class ObjectTouches:
         self.done, self.uncovered = self._in_vain + state.done, state.uncovered
         touches, places = many(self.done, "touch", "touches"), many(state.uncovered, "place", "places")
         patches = many(len(self.found), "patch", "patches")
-        if state.joining is None:
-            self._is_joining = False
-            # The last touches may still end when it is stopped.
-            goes_on = f"{touches}, {places} left" if state.uncovered else touches
-            self.words = f"Joining {patches}" if self.is_stopped else goes_on
+        is_joining = state.joining is not None
+        if is_joining is not self._is_joining:
+            self._phases, self._before, self._is_joining = self._phases + 1, state.done, is_joining
+        if state.joining == 1.0:
+            self.words = f"Checking the surface of {patches}"
+        elif is_joining or self.is_stopped:  # The last touches may still end when it is stopped.
+            self.words = f"Joining {patches}"
         else:
-            self._rounds += not self._is_joining
-            self._is_joining, self._joined = True, state.done
-            self.words = f"Joining {patches}" if state.joining < 1.0 else f"Checking the surface of {patches}"
+            self.words = f"{touches}, {places} left" if state.uncovered else touches
         self.share = max(self.share, self._share(state))
 
     def _share(self, state: core.Progress) -> float:
         """About which share of all is done in a state of the touches."""
         felt = 1.0 - len(self._left) / PLACES
-        if not self._rounds:
+        if not self._phases:
             return TOUCHED * felt
-        # How often it touches and joins again is not known before. Each round has half of what is left.
-        if state.joining is None:
-            done, begun = AGAIN * (1.0 - self._joined / state.done), self._rounds + 1
-        else:
-            done, begun = AGAIN + (1.0 - AGAIN) * state.joining, self._rounds
-        return felt * (TOUCHED + (JOINED - TOUCHED) * (1.0 - (2.0 - done) * 0.5**begun))
+        # How often it touches and joins again is not known before. Each phase has half of what is left.
+        done = 1.0 - self._before / state.done if state.joining is None else state.joining
+        return felt * (TOUCHED + (JOINED - TOUCHED) * (1.0 - (2.0 - done) * 0.5**self._phases))
 
     def meshing(self, start: float = 0.0) -> Iterator[None]:
         """Makes the mesh and compares it in steps, from the share `start` of all on."""

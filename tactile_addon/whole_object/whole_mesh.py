@@ -33,7 +33,7 @@ from .whole_surface import WholeSurface
 SHARP = math.radians(30.0)  # Edges at which faces are turned by more are creases.
 # While a patch is one of many, it is drawn with these rings, from its middle to its dark rim, and spokes.
 RINGS, SPOKES = (0.0, 0.25, 0.5, 0.75, 0.95, 1.0), 48
-RIM_COLOR = (0.02, 0.02, 0.02, 1.0)
+RIM_COLOR = (0.15, 0.15, 0.15, 1.0)
 # It is drawn no lower than the mesh, above that by this share of the object's size, or of its own if that is
 # less, and above patches that it overlaps by as much, up to so many times.
 LAYER, OWN_LAYER, LAYERS = 6e-4, 2e-2, 6
@@ -54,7 +54,7 @@ class GrowingPatches:
         scene.collection.objects.link(obj)  # A collection of its own might be left empty.
         with undo.after_step():  # There is an undo step when the operator ends.
             undo.note_added(obj)
-        obj.data.materials.append(emission("Tactile Surface", attribute=COLOR))
+        obj.data.materials.append(emission("Tactile Surface", COLOR))
         self._patches: list[tuple[Array, Array]] = []
         self._bends: list[tuple[float, float]] = []  # The larger principal curvature of each, and its area.
         self._uid, self._size, self._surface = obj.session_uid, surface.size, surface
@@ -78,7 +78,7 @@ class GrowingPatches:
         count = SPOKES * len(RINGS)
         triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
         bends, areas = np.transpose(self._bends)
-        shades = colors.diverging(mean_curvatures, bend_range(bends, areas, self._size))
+        shades = colors.shades(mean_curvatures, bend_range(bends, areas, self._size))
         shades.reshape(-1, count, 4)[:, -SPOKES:] = RIM_COLOR
         fill(obj.data, points, triangles, [(COLOR, shades)])
 
@@ -142,7 +142,7 @@ def insert(scene: bpy.types.Scene, name: str, whole: WholeSurface, report: dict[
     obj = bpy.data.objects.new(mesh.name, mesh)
     obj.matrix_world = Matrix.Translation(list(whole.origin))
     patch_object.collection(scene).objects.link(obj)
-    mesh.materials.append(emission("Tactile Surface", attribute=COLOR))
+    mesh.materials.append(emission("Tactile Surface", COLOR))
     rewrite(obj, whole, report | {"source": name})
     show_colors()
     return obj
