@@ -16,12 +16,11 @@ import bpy
 from .. import core
 from ..core.arguments import many
 from .comparison.register_operator import register_patch
-from .comparison.verification_wording import verification_columns
-from .comparison.verify_operator import verify_patch
+from .comparison.verify_operator import verification_columns, verify_patch
 from .files import contact_file, export_operators, measured, mesh_file, whole_file
 from .report import report_operator
 from .scene import patch_record
-from .stability_map.map_report import map_table_rows
+from .stability_map.map_object import map_table_rows
 from .touch.types import Object
 from .touch.units import ADAPTIVE, METERS
 from .touch.wording import readable_rows, table

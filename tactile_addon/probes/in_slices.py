@@ -210,7 +210,6 @@ class AllOver(InSlices):
     target: TARGET
 
     meanwhile = {"PASS_THROUGH"}  # The scene may change, because a detached mesh is touched.
-    shown = ("target",)
     _about: Callable[[bpy.types.Context], str]
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:

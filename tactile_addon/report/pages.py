@@ -13,7 +13,6 @@ from ..scene import patch_record
 from ..scene.colors import shades, symmetric_range
 from ..scene.mesh_data import DEVIATION, HEIGHT_STD, MAP_COLOR, POSITION, REASON, corners_of, values
 from ..stability_map import map_object
-from ..stability_map.map_report import map_summary, map_table_rows
 from ..stability_map.stability import NOTHING
 from ..touch import units
 from ..touch.arrays import read_array
@@ -107,10 +106,10 @@ def map_page(painted: Object) -> str:
     unit = units.unit_of_report(bpy.context.scene, record)
     colors = read_array(painted.data.attributes[MAP_COLOR].data, "color_srgb", 4)
     sections = [
-        page.verdict(map_summary(record), record["patches"] > 0 and not record["in_doubt"]),
+        page.verdict(map_object.map_summary(record), record["patches"] > 0 and not record["in_doubt"]),
         page.section("Pictures", _legend(painted, record, unit), *parts.three_sides(painted.data, colors)),
         *_errors(painted, record, unit),
-        *parts.ending(map_table_rows(record), record, unit),
+        *parts.ending(map_object.map_table_rows(record), record, unit),
     ]
     return page.page(f"{painted.name}: a stability map of {record['source']}", sections)
 

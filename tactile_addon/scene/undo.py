@@ -58,7 +58,8 @@ def take_out(*_: Any) -> None:
             _links.append((_set_parent, child.session_uid, obj.session_uid))
             child.parent = None
     for number, above in _collections().items():
-        for links in (above.objects, above.children):
+        kinds: Any = above.objects, above.children
+        for links in kinds:
             for block in [block for block in links if block.session_uid in _added]:
                 _links.append((_link, block.session_uid, number))
                 links.unlink(block)

@@ -9,8 +9,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface
 
 from ..comparison.register_operator import TACTILE_OT_register
-from ..comparison.verification_wording import verification_rows, verification_table
-from ..comparison.verify_operator import TACTILE_OT_verify
+from ..comparison.verify_operator import TACTILE_OT_verify, verification_rows, verification_table
 from ..files.export_operators import TACTILE_OT_export_table
 from ..probes import probe
 from ..probes.in_slices import draw_running
@@ -28,9 +27,9 @@ from ..report.report_operator import TACTILE_OT_export_report
 from ..scene import patch_record
 from ..scene.shown import unit_of_range
 from ..scene.viewports import shows_colors
+from ..stability_map.map_object import facets as map_facets
+from ..stability_map.map_object import map_rows, median_rows
 from ..stability_map.map_operator import TACTILE_OT_stability_map
-from ..stability_map.map_report import facets as map_facets
-from ..stability_map.map_report import map_rows, median_rows
 from ..touch import units
 from ..touch.settings import draw_chosen, draw_fit, draw_noise
 from ..touch.touch_report import TouchReport

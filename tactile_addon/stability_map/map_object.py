@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A stability map as an object: a painted copy of the mesh that was touched."""
+"""A stability map as an object, a painted copy of the mesh that was touched, and what is said of it."""
 
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import bpy
@@ -10,6 +11,7 @@ from bpy.props import EnumProperty
 from mathutils import Matrix, Vector
 
 from ... import core
+from ...core.arguments import many
 from ..scene import colors, patch_object, patch_record
 from ..scene.mesh_data import (
     ABOVE,
@@ -25,9 +27,11 @@ from ..scene.mesh_data import (
 )
 from ..scene.shown import LEAST_LENGTH
 from ..scene.viewports import show_colors
+from ..touch import units
 from ..touch.arrays import read_array
 from ..touch.settings import MOST_PLANES
 from ..touch.types import Array, Object
+from ..touch.wording import fit
 from .stability import NOTHING, REASON_KEYS, REASONS, StabilityMap
 
 PLACES = "tactile_places"  # The points that were touched, in the axes of the map: three numbers each,
@@ -67,6 +71,8 @@ REASON_COLORS = np.array([
     (0.93, 0.93, 0.93, 1.0), (0.94, 0.89, 0.26, 1.0), (0.84, 0.37, 0.0, 1.0),
     (0.0, 0.45, 0.70, 1.0), (0.0, 0.62, 0.45, 1.0), REFUSED,
 ])  # fmt: skip
+
+FACETED = 0.5  # The share of the patches from which on a map says that they follow facets.
 
 
 def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Object:
@@ -184,6 +190,74 @@ def inputs_of(painted: Object) -> dict[str, Any]:
         "degree": 0 if record["degree"] == "auto" else record["degree"],
         "weight": record.get("weight") or 0.0,
     }
+
+
+def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """(label, value) of everything there is to say of a map."""
+    unit = units.unit_of_report(bpy.context.scene, record)
+    names = ("spacing", "extent", "step")
+    lengths = [units.say(record[name], 1, unit) if record[name] else "auto" for name in names]
+    return [
+        (
+            "touched",
+            f"{record['source']}, at {record['touched']} of {many(record['points'], 'point', 'points')}",
+        ),
+        ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
+        ("refused", ", ".join(_refused(record)) or "none"),
+        ("fit", fit(record)),
+        (", ".join(names), ", ".join(lengths)),
+        *((f"median {title.lower()}", value) for title, value in median_rows(record, unit)),
+    ]
+
+
+def map_summary(record: Mapping[str, Any]) -> str:
+    """A sentence on what a stability map has found."""
+    patches = many(record["patches"], "patch", "patches")
+    words = f"{patches} at {many(record['touched'], 'point', 'points')}, {record['in_doubt']} in doubt"
+    refused = _refused(record)
+    return f"{words}; refused: {', '.join(refused)}" if refused else words
+
+
+def _refused(record: Mapping[str, Any]) -> list[str]:
+    """How many points were refused, for each reason."""
+    names = {key: name for key, name, _ in REASONS}
+    return [f"{count} {names[key]}" for key, count in record["refused"].items() if count]
+
+
+def map_rows(record: Mapping[str, Any], unit: units.Unit) -> list[tuple[str, str]]:
+    """(label, value) of how many patches a stability map has, and of the reasons why there are not more."""
+    names, refused = {key: name for key, name, _ in REASONS}, [*record["refused"].items()]
+    return [
+        ("Points", _points(record)),
+        ("Spacing", units.say(record["spacing"], 1, unit)),
+        ("Patches", str(record["patches"])),
+        ("… in Doubt", str(record["in_doubt"])),
+        *([("… on Facets", str(record["few_facets"]))] if record.get("few_facets") else []),
+        *([("No Patch", str(sum(count for _, count in refused)))] if refused else []),
+        *((names[key], str(count)) for key, count in refused if count),
+    ]
+
+
+def _points(record: Mapping[str, Any]) -> str:
+    touched, points = record["touched"], record["points"]
+    return str(points) if touched == points else f"{touched} of {points}"
+
+
+def facets(record: Mapping[str, Any]) -> str | None:
+    """A sentence if half of the patches or more follow facets, as the verdict on a patch has it; or None."""
+    count = record.get("few_facets", 0)
+    if count < max(FACETED * record["patches"], 1):
+        return None
+    return f"Curvature of the facets, not of the shape, at {many(count, 'point', 'points')}"
+
+
+def median_rows(record: Mapping[str, Any], unit: units.Unit) -> Iterator[tuple[str, str]]:
+    """(label, value) of the medians over the patches of a stability map that are known."""
+    for name, title, _, power in MAP_QUANTITIES:
+        if f"{name}_median" in record:
+            found = record[f"{name}_median"]
+            # In single precision a little is left of 0.
+            yield title, units.say(units.rounded(found, power, record["spacing"]), power, unit)
 
 
 def _show(obj: Object, context: bpy.types.Context) -> None:

@@ -13,7 +13,6 @@ from ..touch import units
 from ..touch.settings import NAMES, TouchSettings, length_property, touch_arguments
 from ..touch.types import Outcome
 from . import map_object
-from .map_report import map_summary
 from .stability import StabilityMap, expected_count, seconds_each
 
 
@@ -69,7 +68,7 @@ class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
         painted = map_object.insert(context, target, self._map)
         make_active(context, painted)
         record = painted[patch_record.MAP_RECORD].to_dict()
-        return report_done(self, map_summary(record), record["patches"] > 0)
+        return report_done(self, map_object.map_summary(record), record["patches"] > 0)
 
     def _about(self, context: bpy.types.Context) -> str:
         """A sentence on what will be touched at how many points."""

@@ -199,7 +199,7 @@ def test_the_page_of_a_map_counts_touches_by_their_area_and_no_vertices(empty, e
     painted = empty.context.object
     record = painted["tactile_map"].to_dict()
     page = Page(extension.tactile_addon.report.pages.map_page(painted))
-    rows = dict(extension.tactile_addon.stability_map.map_report.map_table_rows(record))
+    rows = dict(extension.tactile_addon.stability_map.map_object.map_table_rows(record))
     (row,) = [row for row in page.rows if row[0] == "± 1 standard deviation"]
     assert row[1] == rows["median standard deviation"]
 
