@@ -174,6 +174,7 @@ def _require_outputs(options: argparse.Namespace) -> None:
     outputs = {name: Path(path) for name, path in given.items() if path not in (None, "-")}
     scene = bpy.data.filepath and Path(bpy.data.filepath)
     inputs = [*(options.files or ()), *filter(None, (options.file, options.onto, scene))]
+    kinds = {"output": COMMANDS[options.command].kinds, "report": (".html",)}
     taken = {path.resolve(): "reads" for path in inputs}
     for name, path in outputs.items():
         if path.exists() and not path.is_file():
@@ -186,11 +187,8 @@ def _require_outputs(options: argparse.Namespace) -> None:
         taken[path.resolve()] = "writes"
         if not path.absolute().parent.is_dir():
             raise OSError(f'there is no folder "{path.parent}" to write "{path.name}" to')
-    kinds = COMMANDS[options.command].kinds
-    if "output" in outputs and options.output.suffix.lower() not in kinds:
-        raise Misuse(f"--output: expected a file {' or '.join(kinds)}, got {options.output}")
-    if "report" in outputs and options.report.suffix.lower() != ".html":
-        raise Misuse(f"--report: expected a file .html, got {options.report}")
+        if name in kinds and path.suffix.lower() not in kinds[name]:
+            raise Misuse(f"--{name}: expected a file {' or '.join(kinds[name])}, got {path}")
 
 
 def _compare(patch: Object, options: argparse.Namespace) -> None:

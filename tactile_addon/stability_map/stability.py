@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 
 from ... import core
-from ...core.triangles import triangle_cross
+from ...core.triangles import cut_to_edges, triangle_cross
 from ..scene.mesh_data import MEASURES
 from ..touch.arrays import read_array
 from ..touch.detached_mesh import DetachedMesh
@@ -125,7 +125,9 @@ class StabilityMap:
 
     def steps(self) -> Iterator[None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
-        self.points, self.triangles, self.owners = _cut(self.surface, self.spacing)
+        self.points, self.triangles, self.owners = cut_to_edges(
+            self.surface.points, self.surface.triangles, self.surface.owners, self.spacing
+        )
         corners = self.points[self.triangles]
         self._middles = corners.mean(axis=1)
         self.areas = 0.5 * np.linalg.norm(triangle_cross(corners), axis=1)
@@ -243,29 +245,6 @@ def _reason_of(stops: Iterable[str]) -> int:
     """The code of the most frequent stop. Curves that go on, but have no tangent plane, are on a crease."""
     counts = Counter(stop for stop in stops if stop in STOP_CODES)
     return STOP_CODES[counts.most_common(1)[0][0] if counts else core.CREASE]
-
-
-def _cut(surface: DetachedMesh, longest: float) -> tuple[Array, Array, Array]:
-    """Points (n, 3), triangles (m, 3) and their faces (m,) of a mesh, cut until no edge is longer than that.
-
-    Triangles are halved at the middle of their longest edge. A neighbor may not be, which leaves no gap, as
-    triangles are flat.
-    """
-    points, triangles, owners = surface.points, surface.triangles, surface.owners
-    while True:
-        corners = points[triangles]
-        sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
-        large = sides.max(axis=1) > longest
-        if not large.any():
-            return points, triangles, owners
-        first = sides[large].argmax(axis=1)[:, None]
-        a, b, c = np.take_along_axis(triangles[large], (first + np.arange(3)) % 3, axis=1).T
-        ends, number = np.unique(np.sort(np.column_stack([a, b]), axis=1), axis=0, return_inverse=True)
-        middle = len(points) + number.ravel()
-        points = np.vstack([points, points[ends].mean(axis=1)])
-        halves = [triangles[~large], np.column_stack([a, middle, c]), np.column_stack([middle, b, c])]
-        triangles = np.vstack(halves).astype(np.int32)
-        owners = np.concatenate([owners[~large], owners[large], owners[large]])
 
 
 def _rehearse(

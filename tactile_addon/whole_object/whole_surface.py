@@ -78,7 +78,7 @@ class WholeSurface:
             "is_closed": mesh.is_closed and not atlas.uncovered,
             "vertices": len(mesh.vertices),
             "triangles": len(mesh.triangles),
-            "edge": _edge(mesh),
+            "edge": mesh.edge,
             "unknown_curvatures": int(np.isinf(self.curvatures["mean_curvature_std"]).sum()),
             "height_std": float(mesh.std[np.isfinite(mesh.std)].mean()),  # It is inf where nothing was felt.
             "radius": float(np.median([r.radius for r in atlas.patches])),
@@ -87,23 +87,6 @@ class WholeSurface:
     def doubts(self) -> list[core.Doubt]:
         """The doubts of the atlas, or that its surface has holes only as it is shown."""
         doubts = list(self.atlas.doubts)
-        if not doubts and _rims(self.mesh) > _rims(self.atlas.reference.mesh):
+        if not doubts and self.mesh.rims > self.atlas.reference.mesh.rims:
             doubts.append(core.Doubt("holes"))
         return doubts
-
-
-def _edge(mesh: core.Mesh) -> float:
-    """The typical length of a mesh's edges."""
-    ends = mesh.vertices[mesh.triangles]
-    return float(np.median(np.linalg.norm(ends - np.roll(ends, 1, axis=1), axis=2)))
-
-
-def _rims(mesh: core.Mesh) -> int:
-    """The number of rims of a mesh: where its object ends, and around holes."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    ends, index = np.unique(mesh.border, return_inverse=True)
-    a, b = index.reshape(-1, 2).T
-    links = coo_matrix((np.ones(len(a)), (a, b)), (len(ends),) * 2)
-    return connected_components(links)[0] if len(ends) else 0

@@ -166,7 +166,7 @@ def test_an_automatic_extent_fits_the_place(empty, ridge):
 def test_a_map_with_an_automatic_extent_says_so(empty, ridge, extension):
     painted, record = stability_map(empty, target=ridge.name, spacing=0.5)
     stability_map_room = extension.tactile_addon.stability_map
-    rows = dict(stability_map_room.map_report.map_table_rows(record))
+    rows = dict(stability_map_room.map_object.map_table_rows(record))
     assert rows["spacing, extent, step"] == "0.5 m, auto, auto"
     assert stability_map_room.map_object.inputs_of(painted)["extent"] == 0.0  # a probe on the map gets this
 
