@@ -18,7 +18,7 @@ from ..core.arguments import many
 from .comparison.register_operator import register_patch
 from .comparison.verify_operator import verification_columns, verify_patch
 from .files import contact_file, export_operators, measured, mesh_file, whole_file
-from .report import report_operator
+from .report import pages
 from .scene import patch_record
 from .stability_map.map_object import map_table_rows
 from .touch.types import Object
@@ -145,7 +145,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         r = patch_record.reconstruction_of(made)
         contact_file.write(options.contacts, contact_file.contacts_of(r))
     if options.report is not None:
-        report_operator.write(options.report, made)
+        pages.write(options.report, made)
     if options.output is not None:
         _save(options.output, made)
     return report

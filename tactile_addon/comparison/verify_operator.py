@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The operator that compares a patch, where it is now, with any mesh, and the work behind it."""
 
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import bpy
@@ -11,7 +11,6 @@ from bpy.props import StringProperty
 
 from ... import core
 from ...core.arguments import many
-from ...core.steps import result_of
 from ..probes import probe, touch_again
 from ..probes.change_handlers import is_pending
 from ..probes.in_slices import InSlices, Progress
@@ -23,7 +22,8 @@ from ..touch.touch_report import TouchReport, judgment
 from ..touch.types import Object, Outcome
 from ..touch.wording import SPREAD, cell
 
-VERTICES_AT_ONCE = 2000  # A step looks at this many vertices.
+VERTICES_AT_ONCE = 2000  # A step looks at this many vertices,
+VERIFYING = 0.8  # which takes this share of the time.
 VERTICES = "vertices", "vertex_distance_mean", "vertex_distance_max"  # What the report has of them, too.
 
 # The results of core.verify, and the largest distance of the patch from the mesh, in the order of a table.
@@ -38,8 +38,6 @@ VERIFIED = (
 class Verification:
     """The comparison of a patch object with a mesh object, in steps; nothing is changed before `write`.
 
-    done, count : numbers of the vertices near the patch that were looked at, and of all
-
     Raises ValueError, with a sentence, if they cannot be compared.
     """
 
@@ -51,7 +49,6 @@ class Verification:
         self._surface: MeshSurface | None = None
         self._found: dict[str, Any] = {}
         self._error = core.MeshError(None)
-        self.done, self.count = 0, 0
 
     def look(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Lets the steps go on in the scene as it is now. Raises ValueError if patch or mesh have changed."""
@@ -67,20 +64,18 @@ class Verification:
         """Casts a ray at the target, as MeshSurface does."""
         return self._surface.ray_cast(*ray)
 
-    def steps(self) -> Generator[None, None, None]:
-        """Does everything, as a generator that yields every few hundredths of a second."""
-        r = self._r
+    def steps(self) -> Iterator[float]:
+        """Does everything, as a generator that yields the share that is done."""
+        r, seen = self._r, [np.empty((0, 3))]
         vertices = np.vstack([*self._surface.vertices_near(r.frame.origin, 2.0 * r.radius)])
-        self.count, seen = len(vertices), [np.empty((0, 3))]
-        yield
-        for start in range(0, self.count, VERTICES_AT_ONCE):
-            some = slice(start, start + VERTICES_AT_ONCE)
-            seen.append(vertices[some][core.reachable(r.geometry, self, vertices[some])])
-            self.done = min(start + VERTICES_AT_ONCE, self.count)
-            yield
+        yield 0.0
+        for start in range(0, len(vertices), VERTICES_AT_ONCE):
+            some = vertices[start : start + VERTICES_AT_ONCE]
+            seen.append(some[core.reachable(r.geometry, self, some)])
+            yield VERIFYING * start / len(vertices)
         for found in core.verifying(r, self, np.vstack(seen)):
             self._found = found
-            yield
+            yield VERIFYING
         # Of a coarse mesh few vertices are over the patch, or none.
         self._error = core.mesh_error(r, self)
 
@@ -126,7 +121,8 @@ def verify_patch(patch: Object, target: Object, depsgraph: bpy.types.Depsgraph) 
     """
     verification = Verification(patch, target)
     verification.look(depsgraph)
-    result_of(verification.steps())
+    for _ in verification.steps():
+        pass
     verification.write()
 
 
@@ -272,11 +268,7 @@ class TACTILE_OT_verify(WithMesh, bpy.types.Operator):
         self._verification.look(context.evaluated_depsgraph_get())
 
     def _done(self) -> Progress:
-        done, count = self._verification.done, self._verification.count
-        words = f'Comparing with "{self._verification.target}"'
-        if not count:  # It has faces near the patch, but no vertices.
-            return words, None
-        return f"{words}: {done} of {many(count, 'vertex', 'vertices')}", done / count
+        return f'Comparing with "{self._verification.target}"', self._share
 
     def _finish(self, context: bpy.types.Context) -> Outcome:
         record = self._verification.write()

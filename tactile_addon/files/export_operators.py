@@ -37,17 +37,17 @@ WORD_COLUMNS = ("source", "method", "status", "message")
 
 
 class ObjectExport(ExportHelper, OperatorMixin):  # type: ignore[misc]  # of `invoke`, by the stubs
-    """For operators that write what is active to inherit: a patch, by itself or its probe."""
+    """For operators that write something to inherit: the active patch, by itself or its probe, or else."""
 
     if TYPE_CHECKING:  # At run time this would hide the property of ExportHelper.
         filepath: str
     filename_ext: str
-    write: Callable[[Object], None]
+    write: Callable[[Any], str | None]  # It may say what it has written.
     hint = "Select a patch or its probe first"
 
     @staticmethod
-    def written(context: bpy.types.Context) -> Object | None:
-        """The object to write, or None."""
+    def written(context: bpy.types.Context) -> Any:
+        """What to write, if there is anything."""
         return probe.patch_near(context.view_layer.objects.active)
 
     @classmethod
@@ -55,16 +55,17 @@ class ObjectExport(ExportHelper, OperatorMixin):  # type: ignore[misc]  # of `in
         return polls(cls, cls.written(context), cls.hint)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
-        if not self.filepath:
-            self.filepath = bpy.path.clean_name(self.written(context).name) + self.filename_ext
+        written = self.written(context)
+        if not self.filepath and isinstance(written, bpy.types.Object):
+            self.filepath = bpy.path.clean_name(written.name) + self.filename_ext
         return super().invoke(context, event)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         try:
-            self.write(self.written(context))
+            words = self.write(self.written(context)) or "Wrote"
         except (OSError, ValueError) as error:
             return report_error(self, error)
-        return report_done(self, f'Wrote "{Path(self.filepath).name}"')
+        return report_done(self, f'{words} "{Path(self.filepath).name}"')
 
 
 class TACTILE_OT_export_contacts(ObjectExport, bpy.types.Operator):
@@ -98,33 +99,27 @@ class TACTILE_OT_export_patch(ObjectExport, bpy.types.Operator):
         contact_file.write_patch(self.filepath, patch_record.reconstruction_of(patch))
 
 
-class TACTILE_OT_export_table(bpy.types.Operator, ExportHelper):  # type: ignore[misc]  # as above
+class TACTILE_OT_export_table(ObjectExport, bpy.types.Operator):
     """Write what all patches have found as CSV, one row a probe, in the scene's units"""
 
     bl_idname = "tactile.export_table"
     bl_label = "Export Table of Patches"
     filename_ext = ".csv"
-    if TYPE_CHECKING:
-        filepath: str
     filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
+    hint = "There is no patch to export: pick a reference point first"
     use_selection: BoolProperty(
         name="Selected Only", description="Write the selected probes and patches only", default=False
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        patches = patches_of(context.view_layer.objects)
-        return polls(cls, patches, "There is no patch to export: pick a reference point first")
+    @staticmethod
+    def written(context: bpy.types.Context) -> list[Object]:
+        return patches_of(context.view_layer.objects)
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        objects = context.view_layer.objects
-        try:
-            patches = patches_of(objects.selected if self.use_selection else objects)
-            write_table(self.filepath, patches, context.scene)
-        except (OSError, ValueError) as error:
-            return report_error(self, error)
-        count, name = many(len(patches), "patch", "patches"), Path(self.filepath).name
-        return report_done(self, f'Wrote a table of {count}: "{name}"')
+    def write(self, patches: list[Object]) -> str:
+        if self.use_selection:
+            patches = patches_of(bpy.context.view_layer.objects.selected)
+        write_table(self.filepath, patches, bpy.context.scene)
+        return f"Wrote a table of {many(len(patches), 'patch', 'patches')}:"
 
 
 def patches_of(objects: Iterable[Object]) -> list[Object]:

@@ -23,7 +23,7 @@ from ..probes.probe_operators import (
     TACTILE_OT_show_colors,
     TACTILE_OT_update,
 )
-from ..report.report_operator import TACTILE_OT_export_report
+from ..report.pages import TACTILE_OT_export_report
 from ..scene import patch_record
 from ..scene.shown import unit_of_range
 from ..scene.viewports import shows_colors

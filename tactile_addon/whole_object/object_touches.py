@@ -64,9 +64,6 @@ class ObjectTouches:
         import scipy.interpolate  # The import takes half a second, too long between redraws.
         import scipy.ndimage  # noqa: F401
 
-        for name, value in (("tolerance", tolerance), ("noise", noise), ("edge", edge)):
-            if not value >= 0.0:  # NaN fails every comparison, so it is refused, too.
-                raise ValueError(f"The {name} is a length of 0 or more, got {length(value)}")
         self.surface = DetachedMesh(obj, depsgraph)
         self.tolerance = tolerance or tolerance_of(self.surface.size, accuracy, noise)
         self._require_lengths(noise, edge)
@@ -94,20 +91,22 @@ class ObjectTouches:
     def _require_lengths(self, noise: float, edge: float) -> None:
         """Raises ValueError, with a sentence, for lengths that are too large or too small for this object."""
         name, size, tolerance = self.surface.name, self.surface.size, self.tolerance
-        if tolerance < noise:
-            raise ValueError(
-                f"The tolerance {length(tolerance)} is below the noise {length(noise)}: use a larger one"
-            )
         for what, value, most in (
             ("noise", noise, LARGEST_TOLERANCE),
             ("tolerance", tolerance, LARGEST_TOLERANCE),
             ("edge length", edge, LARGEST_EDGE),
         ):
+            if not value >= 0.0:  # NaN fails every comparison, so it is refused, too.
+                raise ValueError(f"The {what} is a length of 0 or more, got {length(value)}")
             if value > most * size:
                 raise ValueError(
                     f'The {what} {length(value)} is larger than {length(most * size)}, {most:g} of "{name}": '
                     "use a smaller one"
                 )
+        if tolerance < noise:
+            raise ValueError(
+                f"The tolerance {length(tolerance)} is below the noise {length(noise)}: use a larger one"
+            )
         if tolerance < self.surface.spacing:
             raise ValueError(
                 f'The tolerance {length(tolerance)} is finer than the coordinates of "{name}", which are '

@@ -34,11 +34,11 @@ SHARP = math.radians(30.0)  # Edges at which faces are turned by more are crease
 # While a patch is one of many, it is drawn with these rings, from its middle to its dark rim, and spokes.
 RINGS, SPOKES = (0.0, 0.25, 0.5, 0.75, 0.95, 1.0), 48
 RIM_COLOR = (0.15, 0.15, 0.15, 1.0)
-# It is drawn no lower than the mesh, above that by this share of the object's size, or of its own if that is
-# less, and above patches that it overlaps by as much, up to so many times.
+# It is drawn no lower than the mesh, and above that by one to seven times this share of the object's size, or
+# of its own if that is less: overlapping patches at one height would flicker, and multiples of the golden
+# section are far apart from those before them.
 LAYER, OWN_LAYER, LAYERS = 6e-4, 2e-2, 6
-# Patches overlap only if the cosine between their normals is more; that of two walls of a block is 0.
-ALIKE = 0.1
+GOLDEN_SECTION = 0.5 * (math.sqrt(5.0) - 1.0)
 DRAWN_ABOVE = 5e-3  # That of the whole surface where it is not drawn in front, as a share of its size.
 
 
@@ -58,7 +58,6 @@ class GrowingPatches:
         self._patches: list[tuple[Array, Array]] = []
         self._bends: list[tuple[float, float]] = []  # The larger principal curvature of each, and its area.
         self._uid, self._size, self._surface = obj.session_uid, surface.size, surface
-        self._placed = np.zeros((0, 8))  # The origin, normal, reach and height of each patch.
         show_colors()
         show_size(surface.size)
 
@@ -70,7 +69,8 @@ class GrowingPatches:
         for r, rim in zip(found, rims, strict=True):
             points, normals, mean_curvature = _disk(r, rim)
             layer = min(LAYER * self._size, OWN_LAYER * float(np.median(rim)))
-            above = _below(self._surface, points, normals) + self._height(r.frame, rim.max(), layer)
+            layer *= 1.0 + LAYERS * (GOLDEN_SECTION * len(self._patches) % 1.0)
+            above = _below(self._surface, points, normals) + layer
             self._patches.append((points + above[:, None] * normals, mean_curvature))
             certain = max(abs(r.k1) - r.k1_std, abs(r.k2) - r.k2_std, 0.0)
             self._bends.append((certain, np.mean(rim**2)))
@@ -81,17 +81,6 @@ class GrowingPatches:
         shades = colors.shades(mean_curvatures, bend_range(bends, areas, self._size))
         shades.reshape(-1, count, 4)[:, -SPOKES:] = RIM_COLOR
         fill(obj.data, points, triangles, [(COLOR, shades)])
-
-    def _height(self, frame: core.Frame, reach: float, layer: float) -> float:
-        """The lowest free multiple of a length for a patch, as overlapping ones at one height flicker."""
-        normal, (others, ups) = frame.axes[:, 2], np.hsplit(self._placed[:, :6], 2)
-        near = np.linalg.norm(others - frame.origin, axis=1) < self._placed[:, 6] + reach
-        taken = self._placed[near & (ups @ normal > ALIKE), 7]
-        heights = layer * np.arange(1, LAYERS + 1)
-        is_free = np.abs(heights[:, None] - taken).min(axis=1, initial=np.inf) > 0.4 * layer
-        height = float(heights[np.argmax(is_free) if is_free.any() else len(taken) % LAYERS])
-        self._placed = np.vstack([self._placed, [*frame.origin, *normal, reach, height]])
-        return height
 
     def remove(self) -> None:
         """Deletes the object, if it is still there."""
