@@ -31,8 +31,9 @@ from ..touch.types import Array, Object
 from .whole_surface import WholeSurface
 
 SHARP = math.radians(30.0)  # Edges at which faces are turned by more are creases.
-# While a patch is one of many, it is drawn with these rings, from its middle to its dark rim, and spokes.
-RINGS, SPOKES = (0.0, 0.25, 0.5, 0.75, 0.95, 1.0), 48
+# While a patch is one of many, it is drawn with these rings, the last of which is its dark rim, and spokes.
+# The first is too small to be seen as a hole; a point has triangles without area, which shade it as a star.
+RINGS, SPOKES = (0.01, 0.25, 0.5, 0.75, 0.95, 1.0), 48
 RIM_COLOR = (0.15, 0.15, 0.15, 1.0)
 # It is drawn no lower than the mesh, and above that by one to seven times this share of the object's size, or
 # of its own if that is less: overlapping patches at one height would flicker, and multiples of the golden
