@@ -64,12 +64,21 @@ def forget() -> None:
     _kept.clear()
 
 
-class Growing(InSlices):
-    """For operators that touch an object all over, with `_touches`: patches appear, and Esc keeps them."""
+class WithTouches(InSlices):
+    """For operators to inherit that make the surface of a whole object from ObjectTouches, `_touches`."""
+
+    _touches: ObjectTouches
+
+    def _done(self) -> Progress:
+        share = self._touches.share
+        return f"{self._touches.words}: {share:.0%}", share
+
+
+class Growing(WithTouches):
+    """For operators that touch an object all over: patches appear, and Esc keeps them."""
 
     stop = "Stop Touching and Keep"
     stopped = "Stopped: no surface was kept"
-    _touches: ObjectTouches
     _growing: whole_mesh.GrowingPatches | None = None
     _is_ending = False  # Esc was pressed once.
 
@@ -86,10 +95,6 @@ class Growing(InSlices):
             shown = len(self._touches.found)
             yield
 
-    def _done(self) -> Progress:
-        share = self._touches.share
-        return f"{self._touches.words}: {share:.0%}", share
-
     def _check(self, context: bpy.types.Context) -> None:
         self._touches.surface.require_source(context)
 
@@ -98,8 +103,7 @@ class Growing(InSlices):
         if self._is_ending or not self._touches.found:
             return super()._stopped(context)
         self._is_ending, self.stop = True, "Discard the Surface"
-        if not self._touches.is_stopped:  # It may be meshing already.
-            self._touches.stop()
+        self._touches.stop()
         return {"RUNNING_MODAL"}
 
     def _leave(self, context: bpy.types.Context) -> None:

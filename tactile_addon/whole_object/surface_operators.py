@@ -9,7 +9,6 @@ import numpy as np
 from bpy.props import IntProperty
 from mathutils import Vector
 
-from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import is_in_object_mode, make_active, polls, report_done, report_error, surface_of
 from ..scene import patch_record
 from ..scene.mesh_data import DEVIATION, own_mesh, values
@@ -18,7 +17,7 @@ from ..touch.arrays import read_array
 from ..touch.settings import length_property
 from ..touch.types import Object, Outcome, Point
 from . import whole_mesh
-from .object_operator import EDGE, Growing, keep, touches_of
+from .object_operator import EDGE, Growing, WithTouches, keep, touches_of
 from .object_report import deviation, object_summary, unit_of
 from .object_touches import ObjectTouches
 
@@ -78,13 +77,8 @@ def _select_nearest(mesh: bpy.types.Mesh, place: Point) -> Any:
     return mesh.vertices[nearest]
 
 
-class OnSurface(InSlices):
-    """For operators that make the active surface of a whole object anew, from the touches that are kept.
-
-    _touches : the ObjectTouches, once it has begun
-    """
-
-    _touches: ObjectTouches
+class OnSurface(WithTouches):
+    """For operators that make the active surface of a whole object anew, from the touches that are kept."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -140,10 +134,6 @@ class TACTILE_OT_mesh_again(OnSurface, bpy.types.Operator):
 
     def _check(self, context: bpy.types.Context) -> None:
         self._object(context)
-
-    def _done(self) -> Progress:
-        share = self._touches.share
-        return f"{self._touches.words}: {share:.0%}", share
 
     def _finish(self, context: bpy.types.Context) -> Outcome:
         record = self._rewrite(context)
