@@ -105,7 +105,7 @@ def _above(patch: Object, touched: Touched) -> float:
     radius, deepest = touched.result.radius, DEVIATIONS * touched.report["height_std"]
     if touched.report["is_verified"] and touched.surface is not None:
         deepest = max(deepest, -float(values(patch.data, DEVIATION).min()))
-    return min(max(deepest, DRAWN_ABOVE * radius), MOST_ABOVE * radius)
+    return min(deepest + DRAWN_ABOVE * radius, MOST_ABOVE * radius)
 
 
 def collection(scene: bpy.types.Scene) -> bpy.types.Collection:

@@ -35,10 +35,10 @@ SHARP = math.radians(30.0)  # Edges at which faces are turned by more are crease
 # The first is too small to be seen as a hole; a point has triangles without area, which shade it as a star.
 RINGS, SPOKES = (0.01, 0.25, 0.5, 0.75, 0.95, 1.0), 48
 RIM_COLOR = (0.15, 0.15, 0.15, 1.0)
-# It is drawn no lower than the mesh, and above that by one to seven times this share of the object's size, or
+# It is drawn no lower than the mesh, and above that by one to four times this share of the object's size, or
 # of its own if that is less: overlapping patches at one height would flicker, and multiples of the golden
 # section are far apart from those before them.
-LAYER, OWN_LAYER, LAYERS = 6e-4, 2e-2, 6
+LAYER, OWN_LAYER, LAYERS = 6e-4, 2e-2, 3
 GOLDEN_SECTION = 0.5 * (math.sqrt(5.0) - 1.0)
 DRAWN_ABOVE = 5e-3  # That of the whole surface where it is not drawn in front, as a share of its size.
 
