@@ -77,9 +77,6 @@ COMMANDS = {
         "stability_map", patch_record.MAP_RECORD, _lines_of(map_table_rows), MESH_FILES, {"progress": True}
     ),
 }
-# The operators take these options unchanged.
-PLAIN = {"location", "outward", "spacing", "extent", "step", "noise", "seed", "method", "weight", "solver"}
-PLAIN |= {"edge", "most", "tolerance", "unit", "point", "flip", "radius", "normal_std"}
 # Operators would replace negative numbers by 0.
 NEVER_NEGATIVE = ("radius", "noise", "normal_std", "seed")
 
@@ -95,18 +92,19 @@ def _require_numbers(options: argparse.Namespace) -> None:
 def _arguments(options: argparse.Namespace) -> dict[str, Any]:
     """The operator's arguments from the options."""
     _require_numbers(options)
-    given = {name: value for name, value in vars(options).items() if name in PLAIN and value is not None}
+    operators: Any = bpy.ops
+    taken = getattr(operators.tactile, COMMANDS[options.command].operator).get_rna_type().properties
+    given = {name: value for name, value in vars(options).items() if value is not None and name in taken}
     if options.degree is not None:
         given["degree"] = 0 if options.degree == "auto" else int(options.degree)
     if options.files:
-        if "location" in given:
-            if "point" in given:
+        if options.location is not None:
+            if options.point is not None:
                 raise Misuse("--location: expected this or --point, got both")
-            given |= {"point": given.pop("location"), "strokes": True}
+            given |= {"point": options.location, "strokes": True}
         if "point" in given:
             given["exact_point"] = json.dumps(given.pop("point"))
         return given | _open_contacts(options)
-    given.pop("unit", None)
     given["target"] = options.target or _default_target(options.file)
     if options.azimuths is not None:
         if not 3 <= len(options.azimuths) <= 6:

@@ -11,7 +11,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from ..touch.settings import TARGET, UNSAVED, draw_chosen
-from ..touch.types import OperatorMixin, Outcome
+from ..touch.types import Object, OperatorMixin, Outcome
 from ..touch.units import duration
 from ..touch.wording import sentence
 from .operators import has_target, is_in_object_mode, report_error, target_object, waiting
@@ -204,13 +204,15 @@ def redraw_sidebars(context: bpy.types.Context) -> None:
 class AllOver(InSlices):
     """For operators that touch a mesh all over to inherit; a dialog names the mesh before they begin.
 
-    Each has `_about(context)`, a sentence on what it will take, which may raise ValueError, with a sentence.
+    Each has `_estimate(context, target)`, a sentence on what it will take, which may raise ValueError, with a
+    sentence.
     """
 
     target: TARGET
 
     meanwhile = {"PASS_THROUGH"}  # The scene may change, because a detached mesh is touched.
-    _about: Callable[[bpy.types.Context], str]
+    _estimate: Callable[[bpy.types.Context, Object], str]
+    _known: tuple[Any, str] = (None, "")  # What was estimated last, after what it depends on.
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         try:
@@ -220,6 +222,16 @@ class AllOver(InSlices):
         except ValueError as error:
             return report_error(self, error)
         return self._confirm(context, "Touch")
+
+    def _about(self, context: bpy.types.Context) -> str:
+        """A sentence on what it will take with these settings, made once: a dialog is drawn often."""
+        target = target_object(context, self.target)
+        mesh = target.evaluated_get(context.evaluated_depsgraph_get()).data
+        vertices = len(getattr(mesh, "vertices", ()))  # A modifier may have been added.
+        given = target.session_uid, vertices, *(getattr(self, name) for name in self.shown)
+        if given != self._known[0]:
+            self._known = given, self._estimate(context, target)
+        return self._known[1]
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -11,7 +11,7 @@ from ..probes.operators import make_active, report_done, target_object
 from ..scene import patch_record
 from ..touch import units
 from ..touch.settings import NAMES, TouchSettings, length_property, touch_arguments
-from ..touch.types import Outcome
+from ..touch.types import Object, Outcome
 from . import map_object
 from .stability import StabilityMap, expected_count, seconds_each
 
@@ -31,7 +31,6 @@ class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
 
     stop = "Stop and Keep"
     shown = ("target", "spacing", "extent", "noise", "seed")  # All else is as the active probe has it.
-    _counted: tuple[object, str] = (None, "")  # What was said last, after what it depends on.
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
@@ -70,14 +69,10 @@ class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
         record = painted[patch_record.MAP_RECORD].to_dict()
         return report_done(self, map_object.map_summary(record), record["patches"] > 0)
 
-    def _about(self, context: bpy.types.Context) -> str:
+    def _estimate(self, context: bpy.types.Context, target: Object) -> str:
         """A sentence on what will be touched at how many points."""
-        target = target_object(context, self.target)
-        given = target.session_uid, self.extent, self.spacing, self.noise
-        if given != self._counted[0]:  # A dialog is drawn often.
-            depsgraph = context.evaluated_depsgraph_get()
-            count = expected_count(target, depsgraph, self.extent, self.spacing)
-            seconds = count * seconds_each(target, depsgraph, touch_arguments(self))
-            words = f"about {many(units.rough(count), 'touch', 'touches')}, {units.duration(seconds)}"
-            self._counted = given, f"{target.name}: {words}"
-        return self._counted[1]
+        depsgraph = context.evaluated_depsgraph_get()
+        count = expected_count(target, depsgraph, self.extent, self.spacing)
+        seconds = count * seconds_each(target, depsgraph, touch_arguments(self))
+        words = f"about {many(units.rough(count), 'touch', 'touches')}, {units.duration(seconds)}"
+        return f"{target.name}: {words}"

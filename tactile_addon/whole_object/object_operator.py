@@ -4,7 +4,6 @@
 
 from collections.abc import Iterator
 from time import perf_counter
-from typing import Any
 
 import bpy
 import numpy as np
@@ -114,12 +113,11 @@ class Growing(WithTouches):
 
 
 class Expected:
-    """What is expected of an object, kept until it or a number changes, because a dialog draws it often."""
+    """What is expected of an object, whose mesh is kept until the object changes."""
 
     def __init__(self) -> None:
-        self._given: tuple[Any, ...] | None = None
+        self._shape: tuple[int, int] | None = None
         self._mesh: DetachedMesh | None = None
-        self._words = ""
         self.is_faceted = False  # Whether touches would feel the facets of the object one by one.
         self.warnings: list[str] = []
 
@@ -133,21 +131,18 @@ class Expected:
         depsgraph = context.evaluated_depsgraph_get()
         vertices = target.evaluated_get(depsgraph).data.vertices if target.type == "MESH" else ()
         shape = target.session_uid, len(vertices)
-        given = shape, tolerance, accuracy, noise
-        if given != self._given:
-            if self._given is None or self._given[0] != shape:
-                self._mesh = DetachedMesh(target, depsgraph)
-            tolerance = tolerance or tolerance_of(self._mesh.size, accuracy, noise)
-            touches, seconds, share, wall = expected(self._mesh, tolerance, noise)
-            self.is_faceted = share >= FACETED
-            self.warnings = ["Touches will feel its facets one by one"] if self.is_faceted else []
-            if wall < THIN_SHARE:
-                self.warnings.append(f"Walls of {100.0 * wall:.2g} % of its size may be bridged or pierced")
-            self._given = given
-            about = f"{many(touches, 'touch', 'touches')}, {units.duration(seconds)}"
-            unit = units.unit_of_report(context.scene, {"size": self._mesh.size})  # as the panel has
-            self._words = f"Tolerance {units.length(tolerance, unit)}: about {about}"
-        return self._words
+        if shape != self._shape:
+            self._mesh = DetachedMesh(target, depsgraph)
+            self._shape = shape
+        tolerance = tolerance or tolerance_of(self._mesh.size, accuracy, noise)
+        touches, seconds, share, wall = expected(self._mesh, tolerance, noise)
+        self.is_faceted = share >= FACETED
+        self.warnings = ["Touches will feel its facets one by one"] if self.is_faceted else []
+        if wall < THIN_SHARE:
+            self.warnings.append(f"Walls of {100.0 * wall:.2g} % of its size may be bridged or pierced")
+        about = f"{many(touches, 'touch', 'touches')}, {units.duration(seconds)}"
+        unit = units.unit_of_report(context.scene, {"size": self._mesh.size})  # as the panel has
+        return f"Tolerance {units.length(tolerance, unit)}: about {about}"
 
 
 def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, float, float, float]:
@@ -238,11 +233,9 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
         record = made[patch_record.ATLAS_RECORD].to_dict()
         return report_done(self, object_summary(record), record["status"] == "ok")
 
-    def _about(self, context: bpy.types.Context) -> str:
+    def _estimate(self, context: bpy.types.Context, target: Object) -> str:
         """What it will take, in a sentence."""
-        if self._expected is None:
-            self._expected = Expected()
-        target = target_object(context, self.target)
+        self._expected = self._expected or Expected()
         return self._expected.words(target, context, self.tolerance, self.accuracy, self.noise)
 
     def draw(self, context: bpy.types.Context) -> None:
