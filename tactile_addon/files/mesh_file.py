@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scenes and meshes in files, by Blender's own importers and exporter, without a window."""
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -12,16 +12,14 @@ import numpy as np
 from ...core.arguments import many
 from ...core.contact_data.rows import POINT_COLUMNS
 from ..touch.types import Array, Object
-from . import ply_contacts, whole_file
+from . import contact_file, whole_file
 
 STL_HEAD = 84  # The bytes of the head of a binary .stl; the last four are the number of triangles.
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 PLY_LINE = 65_000  # Longer lines in a .ply would end Blender.
 AFTER_WORD = (1, 2, 3)  # These words follow the one that begins the line of a vertex.
 LARGEST = float(np.finfo(np.float32).max)
-HEADER = 1 << 16  # The header of a .ply ends within this many bytes.
 MOST_NAMES = 10  # A sentence lists no more meshes.
-INCOMPLETE = "Blender has not written all of it"
 # The operators that import files with these endings, and their options.
 IMPORTS = {
     ".ply": ("ply_import", {}),
@@ -108,7 +106,7 @@ def _has_wild_vertices(path: Path) -> bool:
 
 
 def _of_ply(data: bytes) -> bool:
-    rows, fields, is_text = ply_contacts.vertex_rows("", data)
+    rows, fields, is_text = contact_file.vertex_rows("", data)
     lines = np.frombuffer(data, np.uint8, len(data) if is_text else data.find(b"end_header"))
     if np.diff(np.flatnonzero(lines == ord("\n")), prepend=-1, append=len(lines)).max() > PLY_LINE:
         raise ValueError
@@ -151,18 +149,15 @@ def write(path: Path, obj: Object) -> None:
 
     Raises OSError with a sentence, as save_scene does; the old file is then as it was.
     """
-    with whole_file.replacing(path) as temporary:
-        with bpy.context.temp_override(selected_objects=[obj], window=bpy.context.window_manager.windows[0]):
-            bpy.ops.wm.ply_export(
-                filepath=str(temporary),
-                export_selected_objects=True,
-                apply_modifiers=False,
-                export_attributes=True,
-                export_uv=False,  # Seams would split vertices.
-            )
-        # On a full disk the exporter reports success.
-        if temporary.stat().st_size < _size_of_ply(temporary, obj.data):
-            raise OSError(INCOMPLETE)
+    seen: Any = {"selected_objects": [obj], "window": bpy.context.window_manager.windows[0]}
+    with whole_file.replacing(path) as temporary, bpy.context.temp_override(**seen):
+        bpy.ops.wm.ply_export(
+            filepath=str(temporary),
+            export_selected_objects=True,
+            apply_modifiers=False,
+            export_attributes=True,
+            export_uv=False,  # Seams would split vertices.
+        )
 
 
 def save_scene(path: Path) -> None:
@@ -171,32 +166,4 @@ def save_scene(path: Path) -> None:
         try:
             bpy.ops.wm.save_as_mainfile(filepath=str(temporary), copy=True)
         except RuntimeError as error:  # If the disk is full, Blender says that there is no such file.
-            raise OSError(INCOMPLETE) from error
-        if not _is_whole_blend(temporary):  # On a full disk Blender 5.2 reports success.
-            raise OSError(INCOMPLETE)
-
-
-def _is_whole_blend(path: Path) -> bool:
-    """Whether a file ends as a .blend does: with the magic number of its table of frames, or with ENDB."""
-    with path.open("rb") as file:
-        start = file.read(4)
-        file.seek(max(0, path.stat().st_size - 64))
-        end = file.read()
-    return end.endswith(b"\xb1\xea\x92\x8f") if start == b"\x28\xb5\x2f\xfd" else b"ENDB" in end
-
-
-def _size_of_ply(path: Path, mesh: bpy.types.Mesh) -> int:
-    """The size that the header of a .ply with the faces of `mesh` promises; huge without a header."""
-    with path.open("rb") as file:
-        head = file.read(HEADER)
-    try:
-        _, elements, below, _ = ply_contacts.header_of("", head)
-    except ValueError:
-        return sys.maxsize
-    # A list begins with its length, and only faces have lists.
-    kinds = [
-        (count, kind if isinstance(kind, str) else kind[0])
-        for _, count, fields in elements
-        for _, kind in fields
-    ]
-    return below + 4 * len(mesh.loops) + sum(count * np.dtype(kind).itemsize for count, kind in kinds)
+            raise OSError("Blender has not written all of it") from error

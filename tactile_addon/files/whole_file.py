@@ -33,6 +33,10 @@ def replacing(path: str | Path) -> Iterator[Path]:
         temporary.unlink()  # and keep a file that is there.
         yield temporary
         with temporary.open("rb+") as file:
+            size = file.seek(0, os.SEEK_END)
+            file.write(b"\0")  # On a full disk Blender reports success, but there is no room for this byte.
+            file.flush()
+            file.truncate(size)
             os.fsync(file.fileno())
         if target.exists():
             shutil.copymode(target, temporary)

@@ -72,9 +72,11 @@ class BothWays:
         )
         yield 0.7
         yield from part_of(self._climb(middles, there, self._to_surface, self._to_mesh), 0.7, 0.8)
-        spread, corner = self._places()
+        target, rng = self._target, np.random.default_rng(SEED)
+        spread, _ = core.scattered(target.points, target.triangles, PLACES, rng)
         felt, back = yield from self._off_surface(spread)
-        yield from self._off_surface(corner)
+        ends = target.points[target.has_face]
+        yield from self._off_surface(ends[:: len(ends) // PLACES + 1])
         yield from part_of(self._climb(felt, back, self._to_mesh, self._to_seen), 0.8, 1.0)
         back = back if len(back) else np.zeros(1)
         self.mean = 0.5 * float(np.average(there, weights=areas) + back.mean())
@@ -98,14 +100,6 @@ class BothWays:
         around[self._mesh.triangles[order]] = off[order][:, None]  # The last, which is the largest, stays.
         farther = np.abs(around) > np.abs(self.deviation)
         self.deviation[farther] = around[farther]
-
-    def _places(self) -> tuple[Array, Array]:
-        """Places of the mesh, (n, 3) each: such that are spread by area over its faces, and vertices."""
-        target, rng = self._target, np.random.default_rng(SEED)
-        corners = np.flatnonzero(target.has_face)
-        if len(corners) > PLACES:
-            corners = rng.choice(corners, PLACES, replace=False)
-        return core.scattered(target.points, target.triangles, PLACES, rng)[0], target.points[corners]
 
     def _off_surface(self, points: Array) -> Generator[float, None, tuple[Array, Array]]:
         """Those points (n, 3) of the mesh that are not hidden, and how far they are off; yields the share."""

@@ -37,7 +37,6 @@ class ObjectTouches:
     explored, found : core.Explorations of the touches so far, and their core.Reconstructions
     rims : how far the finger feels each of their patches all round, (AZIMUTHS,), lengths
     done : the number of touches so far, including those that gave no patch
-    uncovered : the number of places that are known to be uncovered
     words, share : what is going on, and the share of all that is done
     whole, compared : the WholeSurface, and its BothWays from the mesh, once the steps are done
     """
@@ -81,7 +80,7 @@ class ObjectTouches:
         self.explored: list[core.Exploration] = []
         self.found: list[core.Reconstruction] = []
         self.rims: list[Array] = []
-        self.done, self.uncovered = 0, 0
+        self.done = 0
         self.words, self.share = "Looking for a place to begin", 0.0
         self.is_stopped = False
         # How often it has begun to join or to touch again, and the number of touches before.
@@ -173,7 +172,7 @@ class ObjectTouches:
             self._area += r.domain.area
             self._faceted += r.domain.area * self.surface.is_of_facets(r)
             self._left = self._left[~core.covered_by(r, rim, self._left, self.tolerance)]
-        self.done, self.uncovered = self._in_vain + state.done, state.uncovered
+        self.done = self._in_vain + state.done
         touches, places = many(self.done, "touch", "touches"), many(state.uncovered, "place", "places")
         patches = many(len(self.found), "patch", "patches")
         is_joining = state.joining is not None
