@@ -31,9 +31,9 @@ from ..touch.types import Array, Object
 from .whole_surface import WholeSurface
 
 SHARP = math.radians(30.0)  # Edges at which faces are turned by more are creases.
-# While a patch is one of many, it is drawn with these rings, the last of which is its dark rim, and spokes.
-# The first is too small to be seen as a hole; a point has triangles without area, which shade it as a star.
-RINGS, SPOKES = (0.01, 0.25, 0.5, 0.75, 0.95, 1.0), 48
+# While a patch is one of many, it is drawn with these rings around its middle, the last of which is its dark
+# rim, and spokes.
+RINGS, SPOKES = (0.25, 0.5, 0.75, 0.95, 1.0), 48
 RIM_COLOR = (0.15, 0.15, 0.15, 1.0)
 # It is drawn no lower than the mesh, and above that by one to four times this share of the object's size, or
 # of its own if that is less: overlapping patches at one height would flicker, and multiples of the golden
@@ -76,7 +76,7 @@ class GrowingPatches:
             certain = max(abs(r.k1) - r.k1_std, abs(r.k2) - r.k2_std, 0.0)
             self._bends.append((certain, np.mean(rim**2)))
         points, mean_curvatures = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
-        count = SPOKES * len(RINGS)
+        count = 1 + SPOKES * len(RINGS)
         triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
         bends, areas = np.transpose(self._bends)
         shades = colors.shades(mean_curvatures, bend_range(bends, areas, self._size))
@@ -100,7 +100,7 @@ def _disk(r: core.Reconstruction, rim: Array) -> tuple[Array, Array, Array]:
     """
     angles = np.linspace(0.0, 2.0 * np.pi, SPOKES, endpoint=False)
     edge = rim[:: len(rim) // SPOKES, None] * np.column_stack([np.cos(angles), np.sin(angles)])
-    x, y = np.vstack([share * edge for share in RINGS]).T
+    x, y = np.vstack([np.zeros((1, 2)), *(share * edge for share in RINGS)]).T
     d = r.geometry.derivatives(x, y)
     points = r.frame.to_world(np.column_stack([x, y, d.z]))
     mean_curvature = r.patch.mean_curvature(x, y)
@@ -121,9 +121,11 @@ def _below(surface: DetachedMesh, points: Array, normals: Array) -> Array:
 
 def _fan() -> Array:
     """The triangles (m, 3) between the points of a disk."""
-    inner = np.arange(SPOKES * (len(RINGS) - 1)).reshape(-1, SPOKES)
+    inner = np.arange(SPOKES * len(RINGS)).reshape(-1, SPOKES)
     a, b = inner.ravel(), np.roll(inner, -1, axis=1).ravel()
-    return np.vstack([np.column_stack([a, a + SPOKES, b + SPOKES]), np.column_stack([a, b + SPOKES, b])])
+    halves = [np.column_stack([a, a + SPOKES, b + SPOKES]), np.column_stack([a, b + SPOKES, b])]
+    triangles = np.maximum(np.vstack(halves) - SPOKES + 1, 0)  # The innermost ring is one point.
+    return triangles[triangles[:, 0] != triangles[:, 2]]
 
 
 def insert(scene: bpy.types.Scene, name: str, whole: WholeSurface, report: dict[str, Any]) -> Object:
