@@ -6,8 +6,8 @@ Blender's own import of a .ply keeps normals, curves and times of vertices, too,
 reads NaN and words as 0.
 """
 
-import json
 import itertools
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
