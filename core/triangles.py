@@ -62,3 +62,27 @@ def middles_of_parts(n: int) -> Array:
     up, down = i + j < n, i + j < n - 1
     first, second = (np.concatenate([(each[up] + 1 / 3), (each[down] + 2 / 3)]) / n for each in (i, j))
     return np.column_stack([first, second, 1.0 - first - second])
+
+
+def cut_to_edges(
+    points: Array, triangles: Array, owners: Array, longest: float
+) -> tuple[Array, Array, Array]:
+    """Triangles (m, 3) between points (n, 3), cut until no edge is longer; each has the owner, (m,), it had.
+
+    Triangles are halved at the middle of their longest edge. A neighbor may not be, which leaves no gap, as
+    triangles are flat.
+    """
+    while True:
+        corners = points[triangles]
+        sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+        large = sides.max(axis=1) > longest
+        if not large.any():
+            return points, triangles, owners
+        first = sides[large].argmax(axis=1)[:, None]
+        a, b, c = np.take_along_axis(triangles[large], (first + np.arange(3)) % 3, axis=1).T
+        ends, number = np.unique(np.sort(np.column_stack([a, b]), axis=1), axis=0, return_inverse=True)
+        middle = len(points) + number.ravel()
+        points = np.vstack([points, points[ends].mean(axis=1)])
+        halves = [triangles[~large], np.column_stack([a, middle, c]), np.column_stack([middle, b, c])]
+        triangles = np.vstack(halves).astype(np.int32)
+        owners = np.concatenate([owners[~large], owners[large], owners[large]])

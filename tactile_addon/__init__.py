@@ -11,12 +11,12 @@ from . import command_line
 from .comparison import register_operator, verify_operator
 from .files import contact_operators, export_operators
 from .probes import change_handlers, in_slices, operators, probe, probe_operators
-from .report import report_operator
+from .report import pages
 from .scene import shown
 from .sidebar import dots, panel, preferences, rows
 from .stability_map import map_object, map_operator
 from .viewport import drag, gizmos, overlay, pick
-from .whole_object import kept, object_operator, surface_operators
+from .whole_object import object_operator, surface_operators
 
 CLASSES = (
     probe.TactileProbe,
@@ -33,7 +33,7 @@ CLASSES = (
     *probe_operators.OPERATORS,
     *contact_operators.CLASSES,
     *export_operators.CLASSES,
-    report_operator.TACTILE_OT_export_report,
+    pages.TACTILE_OT_export_report,
     rows.TACTILE_OT_copy_value,
     *panel.PANELS,
     preferences.VIEW3D_MT_tactile,
@@ -44,7 +44,7 @@ MENUS = (
     *preferences.MENUS,
     *contact_operators.MENUS,
     *export_operators.MENUS,
-    *report_operator.MENUS,
+    *pages.MENUS,
 )
 PROPERTIES = probe.PROPERTIES | shown.PROPERTIES | map_object.PROPERTIES  # Of objects, by name.
 _commands: list[Any] = []
@@ -78,7 +78,7 @@ def unregister() -> None:
     for menu, draw in MENUS:
         getattr(bpy.types, menu).remove(draw)
     pick.unregister_tool()
-    kept.forget()
+    object_operator.forget()
     for name in PROPERTIES:
         delattr(bpy.types.Object, name)
     _unregister_classes()

@@ -16,12 +16,11 @@ import bpy
 from .. import core
 from ..core.arguments import many
 from .comparison.register_operator import register_patch
-from .comparison.verification_wording import verification_columns
-from .comparison.verify_operator import verify_patch
-from .files import contact_file, measured, mesh_file, patch_table, whole_file
-from .report import report_operator
+from .comparison.verify_operator import verification_columns, verify_patch
+from .files import contact_file, export_operators, measured, mesh_file, whole_file
+from .report import pages
 from .scene import patch_record
-from .stability_map.map_report import map_table_rows
+from .stability_map.map_object import map_table_rows
 from .touch.types import Object
 from .touch.units import ADAPTIVE, METERS
 from .touch.wording import readable_rows, table
@@ -33,14 +32,19 @@ class Misuse(ValueError):
 
 
 class Command(NamedTuple):
-    """The operator of a command, the property in which the result keeps its report, and what words that.
+    """What a command runs.
 
+    operator : the name of the operator
+    record : the property in which the result keeps its report
+    words : what says a report in words
+    kinds : the endings that --output may have
     more : arguments of the operator that are not options
     """
 
     operator: str
     record: str
     words: Callable[[Any], str]
+    kinds: tuple[str, ...]
     more: dict[str, Any]
 
 
@@ -49,39 +53,38 @@ def _lines_of(rows: Callable[[Any], list[tuple[str, str]]]) -> Callable[[Any], s
     return lambda report: table(rows(report))
 
 
+PATCH_FILES = (".blend", ".ply", ".json")
+MESH_FILES = (".blend", ".ply")
 COMMANDS = {
-    "reconstruct": Command("reconstruct", patch_record.RECORD, _lines_of(readable_rows), {}),
-    "fit": Command("import_contacts", patch_record.RECORD, _lines_of(readable_rows), {}),
-    "table": Command("", "", lambda report: f"{many(report['rows'], 'row', 'rows')} written", {}),
+    "reconstruct": Command("reconstruct", patch_record.RECORD, _lines_of(readable_rows), PATCH_FILES, {}),
+    "fit": Command("import_contacts", patch_record.RECORD, _lines_of(readable_rows), PATCH_FILES, {}),
+    "table": Command("", "", lambda report: f"{many(report['rows'], 'row', 'rows')} written", (".csv",), {}),
     "object": Command(
-        "touch_all_over", patch_record.ATLAS_RECORD, _lines_of(object_table_rows), {"progress": True}
+        "touch_all_over",
+        patch_record.ATLAS_RECORD,
+        _lines_of(object_table_rows),
+        MESH_FILES,
+        {"progress": True},
     ),
     "join": Command(
         "import_contacts",
         patch_record.ATLAS_RECORD,
         _lines_of(object_table_rows),
+        MESH_FILES,
         {"whole": True, "progress": True},
     ),
-    "map": Command("stability_map", patch_record.MAP_RECORD, _lines_of(map_table_rows), {"progress": True}),
+    "map": Command(
+        "stability_map", patch_record.MAP_RECORD, _lines_of(map_table_rows), MESH_FILES, {"progress": True}
+    ),
 }
-# The operators take these options unchanged.
-PLAIN = {"location", "outward", "spacing", "extent", "step", "noise", "seed", "method", "weight", "solver"}
-PLAIN |= {"edge", "most", "tolerance", "unit", "point", "flip", "radius"}
 # Operators would replace negative numbers by 0.
 NEVER_NEGATIVE = ("radius", "noise", "normal_std", "seed")
-
-
-# The endings that --output may have.
-PATCH_FILES = (".blend", ".ply", ".json")
-MESH_FILES = (".blend", ".ply")
-KINDS = {"reconstruct": PATCH_FILES, "fit": PATCH_FILES, "table": (".csv",)}
-KINDS |= dict.fromkeys(("object", "join", "map"), MESH_FILES)
 
 
 def _require_numbers(options: argparse.Namespace) -> None:
     """Raises Misuse for numbers that operators cannot have."""
     for name in NEVER_NEGATIVE:
-        value = vars(options).get(name)
+        value = getattr(options, name)
         if value is not None and not 0.0 <= value < math.inf:
             raise Misuse(f"--{name.replace('_', '-')}: expected a finite number of 0 or more, got {value:g}")
 
@@ -89,20 +92,19 @@ def _require_numbers(options: argparse.Namespace) -> None:
 def _arguments(options: argparse.Namespace) -> dict[str, Any]:
     """The operator's arguments from the options."""
     _require_numbers(options)
-    given = {name: value for name, value in vars(options).items() if name in PLAIN and value is not None}
+    operators: Any = bpy.ops
+    taken = getattr(operators.tactile, COMMANDS[options.command].operator).get_rna_type().properties
+    given = {name: value for name, value in vars(options).items() if value is not None and name in taken}
     if options.degree is not None:
         given["degree"] = 0 if options.degree == "auto" else int(options.degree)
-    if options.normal_std is not None:
-        given["normal_std"] = options.normal_std
-    if "files" in options:
-        if "location" in given:
-            if "point" in given:
+    if options.files:
+        if options.location is not None:
+            if options.point is not None:
                 raise Misuse("--location: expected this or --point, got both")
-            given |= {"point": given.pop("location"), "strokes": True}
+            given |= {"point": options.location, "strokes": True}
         if "point" in given:
             given["exact_point"] = json.dumps(given.pop("point"))
         return given | _open_contacts(options)
-    given.pop("unit", None)
     given["target"] = options.target or _default_target(options.file)
     if options.azimuths is not None:
         if not 3 <= len(options.azimuths) <= 6:
@@ -119,7 +121,9 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     """Opens the file, runs the operator, saves, and returns the report."""
     _open(options)
     if options.command == "table":
-        return {"rows": _write_table(options.output)}
+        patches = export_operators.patches_of(bpy.context.view_layer.objects)
+        export_operators.write_table(options.output, patches, bpy.context.scene)
+        return {"rows": len(patches)}
     arguments = _arguments(options)
     before: set[Object] = set(bpy.data.objects)
     command = COMMANDS[options.command]
@@ -139,7 +143,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         r = patch_record.reconstruction_of(made)
         contact_file.write(options.contacts, contact_file.contacts_of(r))
     if options.report is not None:
-        report_operator.write(options.report, made)
+        pages.write(options.report, made)
     if options.output is not None:
         _save(options.output, made)
     return report
@@ -147,14 +151,16 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
 def _open(options: argparse.Namespace) -> None:
     """Checks the options and opens the file. Raises Misuse where an option needs another."""
-    if "files" in options and options.verify is not None and options.onto is None:
+    if options.files and options.verify is not None and options.onto is None:
         raise Misuse("--verify: expected --onto MESH too, the mesh to compare with")
     if options.command == "fit" and options.target and options.onto is None:
         raise Misuse("--target: expected --onto MESH too, the file that has this mesh")
+    if options.command == "table" and options.output is None:
+        raise Misuse("--output: expected OUT, the table to write")
     _require_outputs(options)
     if options.file is not None:
         mesh_file.open_file(options.file)
-    if "files" not in options and getattr(options, "unit", None) is not None:
+    if not options.files and options.unit is not None:
         if bpy.data.filepath or options.file is None:
             raise Misuse("--unit: expected a .ply, .stl or .obj file, because a .blend names its own unit")
         _set_unit(options.unit)
@@ -165,7 +171,8 @@ def _require_outputs(options: argparse.Namespace) -> None:
     given = {name: getattr(options, name) for name in ("json", "output", "contacts", "verify", "report")}
     outputs = {name: Path(path) for name, path in given.items() if path not in (None, "-")}
     scene = bpy.data.filepath and Path(bpy.data.filepath)
-    inputs = [*vars(options).get("files", []), *filter(None, (options.file, options.onto, scene))]
+    inputs = [*(options.files or ()), *filter(None, (options.file, options.onto, scene))]
+    kinds = {"output": COMMANDS[options.command].kinds, "report": (".html",)}
     taken = {path.resolve(): "reads" for path in inputs}
     for name, path in outputs.items():
         if path.exists() and not path.is_file():
@@ -178,18 +185,15 @@ def _require_outputs(options: argparse.Namespace) -> None:
         taken[path.resolve()] = "writes"
         if not path.absolute().parent.is_dir():
             raise OSError(f'there is no folder "{path.parent}" to write "{path.name}" to')
-    kinds = KINDS[options.command]
-    if "output" in outputs and options.output.suffix.lower() not in kinds:
-        raise Misuse(f"--output: expected a file {' or '.join(kinds)}, got {options.output}")
-    if "report" in outputs and options.report.suffix.lower() != ".html":
-        raise Misuse(f"--report: expected a file .html, got {options.report}")
+        if name in kinds and path.suffix.lower() not in kinds[name]:
+            raise Misuse(f"--{name}: expected a file {' or '.join(kinds[name])}, got {path}")
 
 
 def _compare(patch: Object, options: argparse.Namespace) -> None:
     """Compares the patch with the mesh that was touched, or with the one onto which it is put."""
-    target = None if "files" in options else bpy.data.objects[patch[patch_record.RECORD]["source"]]
+    target = None if options.files else bpy.data.objects[patch[patch_record.RECORD]["source"]]
     if options.onto is not None:
-        target = mesh_file.named(options.onto, mesh_file.add(options.onto), options.target)
+        target = mesh_file.named(options.onto, mesh_file.add(options.onto), options.target or "")
         register_patch(patch, target, bpy.context.evaluated_depsgraph_get())
     if target is not None:
         verify_patch(patch, target, bpy.context.evaluated_depsgraph_get())
@@ -230,13 +234,6 @@ def _save(path: Path, made: Object) -> None:
         mesh_file.write(path, made)
     else:
         mesh_file.save_scene(path)
-
-
-def _write_table(path: Path) -> int:
-    """Writes the table of the scene's patches, and returns their number."""
-    patches = patch_table.patches_of(bpy.context.view_layer.objects)
-    patch_table.write(path, patches, bpy.context.scene)
-    return len(patches)
 
 
 def _default_target(file: Path | None) -> str:

@@ -128,11 +128,28 @@ def stage(extension, report):
         scene.collection.objects.link(obj)
     scene.camera = camera
     look(scene, source)
-    ink = extension.tactile_addon.scene.mesh_data.emission("Ink", color=(0.01, 0.01, 0.01, 1.0))
-    paper = extension.tactile_addon.scene.mesh_data.emission("Paper", color=BACKGROUND)
+    ink = plain_material("Ink", (0.01, 0.01, 0.01, 1.0))
+    paper = plain_material("Paper", BACKGROUND)
     put = _Overlay(camera, unit, ink)
     put.card(paper, -2.1)
     return put
+
+
+def plain_material(name, color):
+    """The material of this name, made if missing, which shows one color as it is."""
+    import bpy
+
+    material = bpy.data.materials.get(name)
+    if material is None:
+        material = bpy.data.materials.new(name)
+        if material.node_tree is None:  # Blender 4.5 needs this; later ones deprecate it.
+            material.use_nodes = True
+        material.diffuse_color, nodes = color, material.node_tree.nodes
+        nodes.clear()
+        output, emission = nodes.new("ShaderNodeOutputMaterial"), nodes.new("ShaderNodeEmission")
+        emission.inputs["Color"].default_value = color
+        material.node_tree.links.new(emission.outputs["Emission"], output.inputs["Surface"])
+    return material
 
 
 class _Overlay:
@@ -145,11 +162,13 @@ class _Overlay:
 
     def curves(self, extension, contours):
         """Adds the contours as tubes in the colors of their planes, in front of the mesh; returns them."""
-        module = extension.tactile_addon
-        colors = module.scene.colors.linear([(*color, 1.0) for color in module.viewport.curves.PLANE_COLORS])
-        return [self._curve(extension, c.points, color) for c, color in zip(contours, colors, strict=False)]
+        from mathutils import Color
 
-    def _curve(self, extension, points, color):
+        module = extension.tactile_addon
+        colors = [(*Color(c).from_srgb_to_scene_linear(), 1.0) for c in module.viewport.curves.PLANE_COLORS]
+        return [self._curve(c.points, color) for c, color in zip(contours, colors, strict=False)]
+
+    def _curve(self, points, color):
         import bpy
 
         data = bpy.data.curves.new("Curve", "CURVE")
@@ -159,7 +178,7 @@ class _Overlay:
         rows = np.column_stack([points + 1.5 * np.array(self.toward), np.ones(len(points))])
         spline.points.foreach_set("co", rows.ravel())
         name = "Curve {:.2f} {:.2f} {:.2f}".format(*color[:3])
-        data.materials.append(extension.tactile_addon.scene.mesh_data.emission(name, color=color))
+        data.materials.append(plain_material(name, color))
         obj = bpy.data.objects.new("Curve", data)
         obj.visible_shadow = False
         bpy.context.scene.collection.objects.link(obj)
@@ -203,8 +222,8 @@ def color_bar(extension, put, limit, unit):
     points = np.array([(x, BAR_REACH * y, 0.0) for y in at for x in (0.0, 0.2)])
     corners = 2 * np.arange(BAR_STEPS)[:, None]
     triangles = np.vstack([corners + corner for corner in ((0, 1, 3), (0, 3, 2))])
-    colors = module.scene.colors.diverging(np.repeat(at, 2), 1.0)
-    attributes = [(module.scene.attributes.COLOR, colors)]
+    colors = module.scene.colors.shades(np.repeat(at, 2), 1.0)
+    attributes = [(module.scene.mesh_data.COLOR, colors)]
     strip = bpy.data.meshes.new("Color Bar")
     module.scene.mesh_data.fill(strip, points, triangles, attributes)
     strip.materials.append(bpy.data.materials["Tactile Curvature"])

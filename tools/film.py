@@ -122,7 +122,7 @@ class Film:
 
         bpy.ops.mesh.primitive_uv_sphere_add(radius=0.09 * self.report["radius"])
         ball = bpy.context.object
-        material = self.extension.tactile_addon.scene.mesh_data.emission("Finger", color=FINGER)
+        material = demo.plain_material("Finger", FINGER)
         ball.data.materials.append(material)
         ball.visible_shadow = False  # It floats, like all that is drawn in front of the mesh.
         return ball

@@ -62,6 +62,13 @@ class Mesh(NamedTuple):
         return sides[once][np.argsort(keys[once])]
 
     @property
+    def rims(self) -> int:
+        """The number of connected parts of the border: where the object ends, and around holes."""
+        ends, index = np.unique(self.border, return_inverse=True)
+        a, b = index.reshape(-1, 2).T
+        return connected_pieces(a, b, len(ends))[0] if len(ends) else 0
+
+    @property
     def sides_on_border(self) -> Indices:
         """The number of sides (m,) of each triangle that are on the border."""
         return self._sides[2].reshape(-1, 3).sum(axis=1)

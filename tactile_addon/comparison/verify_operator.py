@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The operator that compares a patch, where it is now, with any mesh, and the work behind it."""
 
-from collections.abc import Generator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import bpy
@@ -11,25 +11,32 @@ from bpy.props import StringProperty
 
 from ... import core
 from ...core.arguments import many
-from ...core.steps import result_of
 from ..probes import probe, touch_again
 from ..probes.change_handlers import is_pending
 from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, report_done, target_object
-from ..scene import attributes, mesh_data, patch_record, shown
+from ..scene import mesh_data, patch_record, shown
+from ..touch import units
 from ..touch.surface import MeshSurface
 from ..touch.touch_report import TouchReport, judgment
 from ..touch.types import Object, Outcome
-from .verification_wording import verification_summary
+from ..touch.wording import SPREAD, cell
 
-VERTICES_AT_ONCE = 2000  # A step looks at this many vertices.
+VERTICES_AT_ONCE = 2000  # A step looks at this many vertices,
+VERIFYING = 0.8  # which takes this share of the time.
 VERTICES = "vertices", "vertex_distance_mean", "vertex_distance_max"  # What the report has of them, too.
+
+# The results of core.verify, and the largest distance of the patch from the mesh, in the order of a table.
+VERIFIED = (
+    *("vertices", *(f"vertex_distance_{key}" for key in SPREAD)),
+    *("contacts", *(f"contact_distance_{key}" for key in SPREAD), "fit_error"),
+    *("extra_contours", "extra_points", "extra_fit_error"),
+    *("total_absolute_curvature", "overlap", "patch_distance_max"),
+)
 
 
 class Verification:
     """The comparison of a patch object with a mesh object, in steps; nothing is changed before `write`.
-
-    done, count : numbers of the vertices near the patch that were looked at, and of all
 
     Raises ValueError, with a sentence, if they cannot be compared.
     """
@@ -42,7 +49,6 @@ class Verification:
         self._surface: MeshSurface | None = None
         self._found: dict[str, Any] = {}
         self._error = core.MeshError(None)
-        self.done, self.count = 0, 0
 
     def look(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Lets the steps go on in the scene as it is now. Raises ValueError if patch or mesh have changed."""
@@ -58,20 +64,18 @@ class Verification:
         """Casts a ray at the target, as MeshSurface does."""
         return self._surface.ray_cast(*ray)
 
-    def steps(self) -> Generator[None, None, None]:
-        """Does everything, as a generator that yields every few hundredths of a second."""
-        r = self._r
+    def steps(self) -> Iterator[float]:
+        """Does everything, as a generator that yields the share that is done."""
+        r, seen = self._r, [np.empty((0, 3))]
         vertices = self._surface.vertices_near(r.frame.origin, 2.0 * r.radius)
-        self.count, seen = len(vertices), [np.empty((0, 3))]
-        yield
-        for start in range(0, self.count, VERTICES_AT_ONCE):
-            some = slice(start, start + VERTICES_AT_ONCE)
-            seen.append(vertices[some][core.reachable(r.geometry, self, vertices[some])])
-            self.done = min(start + VERTICES_AT_ONCE, self.count)
-            yield
+        yield 0.0
+        for start in range(0, len(vertices), VERTICES_AT_ONCE):
+            some = vertices[start : start + VERTICES_AT_ONCE]
+            seen.append(some[core.reachable(r.geometry, self, some)])
+            yield VERIFYING * start / len(vertices)
         for found in core.verifying(r, self, np.vstack(seen)):
             self._found = found
-            yield
+            yield VERIFYING
         # Of a coarse mesh few vertices are over the patch, or none.
         self._error = core.mesh_error(r, self)
 
@@ -80,11 +84,11 @@ class Verification:
         (patch, _), r, surface = self._objects(), self._r, self._surface
         record = patch[patch_record.RECORD]
         # The object's mesh may have another scale than the patch.
-        points = r.radius / record["radius"] * mesh_data.values(patch.data, attributes.POSITION)
+        points = r.radius / record["radius"] * mesh_data.values(patch.data, mesh_data.POSITION)
         normals = r.geometry.normal(points[:, 0], points[:, 1]) @ r.frame.axes.T
         deviations = surface.deviations(r.frame.to_world(points), normals, r.radius)
         mesh_data.own_mesh(patch)
-        mesh_data.write(patch.data, attributes.DEVIATION, deviations)
+        mesh_data.write(patch.data, mesh_data.DEVIATION, deviations)
         shown.recolor(patch)
         farthest = float(np.abs(deviations).max())
         record["verification"] = {"target": self.target, **self._found, "patch_distance_max": farthest}
@@ -117,7 +121,8 @@ def verify_patch(patch: Object, target: Object, depsgraph: bpy.types.Depsgraph) 
     """
     verification = Verification(patch, target)
     verification.look(depsgraph)
-    result_of(verification.steps())
+    for _ in verification.steps():
+        pass
     verification.write()
 
 
@@ -128,77 +133,145 @@ def _inputs(patch: Object, target: Object) -> tuple[Any, ...]:
     )
 
 
-class TACTILE_OT_verify(InSlices, bpy.types.Operator):
+def verification_summary(record: TouchReport) -> tuple[bool, str]:
+    """Whether a verification gives reason to doubt, and a sentence on what it has found."""
+    found = record["verification"]
+    name, vertices, percent = found["target"], found["vertices"], 100.0 * found["overlap"]
+    if not (vertices or percent or found["extra_points"]):
+        return True, f'Nothing of "{name}" is below the patch: move one to the other, or choose another mesh'
+    if not vertices:
+        return (
+            True,
+            f'"{name}" has no vertices over the patch to measure, only faces, over {percent:.0f} % of it',
+        )
+    if record["status"] != "ok":
+        return True, record["message"]
+    unit = units.unit_of_report(bpy.context.scene, record)
+    mean = _length(record, "vertex_distance_mean", unit)
+    most = _length(
+        record, max("vertex_distance_max", "patch_distance_max", key=lambda key: found.get(key, 0.0)), unit
+    )
+    return False, (
+        f'At {many(vertices, "vertex", "vertices")}, "{name}" is {mean} off the patch on average, and '
+        f"either is {most} off the other at most; the mesh covers {percent:.0f} % of the patch"
+    )
+
+
+def verification_columns(report: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """(heading, value) of the columns in a patch's row; a value that is not known is empty."""
+    found = report["verification"]
+    lengths = [key for key in VERIFIED if "distance" in key or "error" in key]
+    return [
+        *((key, cell(report[key])) for key in ("patch", "source", "status")),
+        ("target", cell(found["target"])),
+        *((f"{key} [unit of the file]" if key in lengths else key, found.get(key, "")) for key in VERIFIED),
+    ]
+
+
+def verification_table(record: Mapping[str, Any], unit: units.Unit) -> list[tuple[str, ...]]:
+    """Rows of a label and the values for the mesh and for the contacts; lengths are without unit."""
+    found = record["verification"]
+    symbol, bare = units.symbol(1, unit), ("", unit[1])
+
+    def lengths(key: str) -> Iterator[str]:
+        return (_length(record, f"{what}_distance_{key}", bare) for what in ("vertex", "contact"))
+
+    names = zip(("Mean", "Median", "Maximum", "RMS"), SPREAD, strict=True)
+    return [
+        (f"in {symbol}" if symbol else "Distance", "Mesh", "Contacts"),
+        *((name, *lengths(key)) for name, key in names),
+        ("Points", str(found["vertices"]), str(found["contacts"])),
+    ]
+
+
+def verification_rows(record: Mapping[str, Any], unit: units.Unit) -> list[tuple[str, str]]:
+    """(label, value) of everything else that a verification has found."""
+    found = record["verification"]
+    return [
+        ("Fit Error", _length(record, "fit_error", unit)),
+        (f"Error on {found['extra_contours']} More Curves", _length(record, "extra_fit_error", unit)),
+        ("Total Curvature", f"{found['total_absolute_curvature']:.3g}"),
+        ("Overlap", f"{100.0 * found['overlap']:.0f} %"),
+        ("Largest Deviation", _length(record, "patch_distance_max", unit)),
+    ]
+
+
+def _length(record: Mapping[str, Any], key: str, unit: units.Unit) -> str:
+    """A length in words, or a dash if the verification has not found it."""
+    found = record["verification"]
+    return units.say(units.rounded(found[key], 1, record["radius"]), 1, unit) if key in found else "–"
+
+
+class WithMesh(InSlices):
+    """For operators to inherit that compare the active patch with a mesh, or put it onto one."""
+
+    target: StringProperty(
+        name="Target",
+        description="Name of the mesh object; empty for the other selected mesh, or for the one that was "
+        "touched",
+    )
+    shown: tuple[str, ...] = ("target",)
+    hint: str  # What to select.
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return (
+            has_patch(cls, context, cls.hint)
+            and is_in_object_mode(cls, context, "Patches are compared")
+            and is_unlocked(cls, context)
+        )
+
+    def _mesh(self, context: bpy.types.Context, patch: Object) -> Object:
+        """The mesh object with the name, that is selected, that the patch is for, or that was touched.
+
+        Raises ValueError if there is none, or if several meshes are selected.
+        """
+        if self.target:
+            return target_object(context, self.target)
+        names = [
+            obj.name
+            for obj in context.view_layer.objects.selected
+            if obj.type == "MESH" and not probe.is_result(obj)
+        ]
+        if len(names) > 1:
+            raise ValueError(
+                f"{len(names)} meshes are selected: select one besides the patch, or none to compare "
+                "with the one that was touched"
+            )
+        name = names[0] if names else patch.tactile_target
+        source = probe.record_of(patch)
+        if not name and source is not None and source["source"] not in bpy.data.objects:
+            raise ValueError(
+                f'"{patch.name}" was not touched on a mesh of this file: select the mesh, then the patch'
+            )
+        return target_object(context, name)
+
+
+class TACTILE_OT_verify(WithMesh, bpy.types.Operator):
     """Measure how far the active patch is from the mesh it was touched on, or from another selected mesh"""
 
     bl_idname = "tactile.verify"
     bl_label = "Verify Against Mesh"
     bl_options = {"REGISTER", "UNDO"}
 
-    target: StringProperty(
-        name="Target",
-        description="Name of the mesh object to compare with; empty for the other selected mesh, or for the "
-        "one that was touched",
-    )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return (
-            has_patch(cls, context, "Select a patch; to compare it with another mesh, select that first")
-            and is_in_object_mode(cls, context, "Patches are verified")
-            and is_unlocked(cls, context)
-        )
+    hint = "Select a patch; to compare it with another mesh, select that first"
 
     def _begin(self, context: bpy.types.Context) -> None:
         obj = context.view_layer.objects.active
         found, patch = probe.probe_of(obj), probe.patch_near(obj)
         if found is not None and is_pending(found):  # Completing it later would undo the verification.
             touch_again.refresh(found, context)
-        target = target_object(context, self.target or chosen_mesh(context, patch))
-        self._verification = Verification(patch, target)
+        self._verification = Verification(patch, self._mesh(context, patch))
         self._steps = self._verification.steps()
 
     def _check(self, context: bpy.types.Context) -> None:
         self._verification.look(context.evaluated_depsgraph_get())
 
     def _done(self) -> Progress:
-        done, count = self._verification.done, self._verification.count
-        words = f'Comparing with "{self._verification.target}"'
-        if not count:  # It has faces near the patch, but no vertices.
-            return words, None
-        return f"{words}: {done} of {many(count, 'vertex', 'vertices')}", done / count
+        return f'Comparing with "{self._verification.target}"', self._share
 
     def _finish(self, context: bpy.types.Context) -> Outcome:
         record = self._verification.write()
         probe.patch_near(context.view_layer.objects.active).tactile_colors = "deviation"
         doubt, summary = verification_summary(record)
         return report_done(self, summary, not doubt)
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.prop_search(self, "target", context.scene, "objects")
-
-
-def chosen_mesh(context: bpy.types.Context, patch: Object) -> str:
-    """The name of the selected mesh, or of the patch's own target, or of the mesh it was touched on.
-
-    Raises ValueError if there is none, or if several meshes are selected.
-    """
-    names = [
-        obj.name
-        for obj in context.view_layer.objects.selected
-        if obj.type == "MESH" and not probe.is_result(obj)
-    ]
-    if len(names) > 1:
-        raise ValueError(
-            f"{len(names)} meshes are selected: select one besides the patch, or none to compare "
-            "with the one that was touched"
-        )
-    name = names[0] if names else patch.tactile_target
-    source = probe.record_of(patch)
-    if not name and source is not None and source["source"] not in bpy.data.objects:
-        raise ValueError(
-            f'"{patch.name}" was not touched on a mesh of this file: select the mesh, then the patch'
-        )
-    return name

@@ -22,7 +22,7 @@ from ...core.arguments import many
 from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import is_in_object_mode, make_active, report_done, report_error
 from ..scene import patch_object
-from ..touch.settings import FitSettings, draw_chosen, draw_fit, given, length_property
+from ..touch.settings import FitSettings, draw_fit, given, length_property
 from ..touch.types import Outcome
 from ..touch.units import length
 from ..touch.wording import fit_summary
@@ -126,6 +126,9 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
             scale = context.scene.unit_settings.scale_length
             self._contacts = measured.read(self._paths, self.unit, scale, self.whole)
             return super().execute(context) if self.whole else self._patch(context)
+        except MemoryError:
+            error = ValueError("There are more contacts than fit into memory: use fewer of them")
+            return report_error(self, error)
         except (OSError, ValueError) as error:
             return report_error(self, error)
 
@@ -173,15 +176,12 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
         return report_done(self, object_summary(report), report["status"] == "ok")
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split, layout.use_property_decorate = True, False
+        of_whole = "outward", "flip", "noise", "tolerance"
         of_patch = "point", "strokes", "radius", "flip", "noise", "normal_std"
-        for name in ("unit", "whole", *(("outward", "flip", "noise") if self.whole else of_patch)):
-            layout.prop(self, name)
-        if self.whole:
-            draw_chosen(layout, self, "tolerance")
-        else:
-            draw_fit(layout, self)
+        self.shown = ("unit", "whole", *(of_whole if self.whole else of_patch))
+        super().draw(context)
+        if not self.whole:
+            draw_fit(self.layout, self)
 
 
 class TACTILE_FH_contacts(bpy.types.FileHandler):

@@ -1,11 +1,13 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The export of patches: File > Export."""
+"""The export of patches, each by itself or all as one table for spreadsheets and scripts: File > Export."""
 
+import csv
+import io
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import bpy
 from bpy.props import BoolProperty, StringProperty
@@ -16,22 +18,36 @@ from ...core.arguments import many
 from ..probes import probe
 from ..probes.operators import polls, report_done, report_error
 from ..scene import patch_record
+from ..touch import units
 from ..touch.types import Object, OperatorMixin, Outcome
-from . import contact_file, patch_table
+from ..touch.wording import cell
+from . import contact_file, whole_file
+
+# Keys of the report, and the power of length in the unit of each.
+NUMBER_POWERS = {
+    **dict.fromkeys(("k1", "k1_std", "k2", "k2_std"), -1),
+    **dict.fromkeys(("gaussian_curvature", "gaussian_curvature_std"), -2),
+    **dict.fromkeys(("mean_curvature", "mean_curvature_std", "curvedness"), -1),
+    "shape_index": 0,
+    **dict.fromkeys(("height_std", "fit_error", "vertex_distance_mean", "vertex_distance_max"), 1),
+    **dict.fromkeys(("radius", "extent", "step", "noise"), 1),
+    **dict.fromkeys(("degree", "contacts"), 0),
+}
+WORD_COLUMNS = ("source", "method", "status", "message")
 
 
 class ObjectExport(ExportHelper, OperatorMixin):  # type: ignore[misc]  # of `invoke`, by the stubs
-    """For operators that write what is active to inherit: a patch, by itself or its probe."""
+    """For operators that write something to inherit: the active patch, by itself or its probe, or else."""
 
     if TYPE_CHECKING:  # At run time this would hide the property of ExportHelper.
         filepath: str
     filename_ext: str
-    write: Callable[[Object], None]
+    write: Callable[[Any], str | None]  # It may say what it has written.
     hint = "Select a patch or its probe first"
 
     @staticmethod
-    def written(context: bpy.types.Context) -> Object | None:
-        """The object to write, or None."""
+    def written(context: bpy.types.Context) -> Any:
+        """What to write, if there is anything."""
         return probe.patch_near(context.view_layer.objects.active)
 
     @classmethod
@@ -39,16 +55,17 @@ class ObjectExport(ExportHelper, OperatorMixin):  # type: ignore[misc]  # of `in
         return polls(cls, cls.written(context), cls.hint)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
-        if not self.filepath:
-            self.filepath = bpy.path.clean_name(self.written(context).name) + self.filename_ext
+        written = self.written(context)
+        if not self.filepath and isinstance(written, bpy.types.Object):
+            self.filepath = bpy.path.clean_name(written.name) + self.filename_ext
         return super().invoke(context, event)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         try:
-            self.write(self.written(context))
+            words = self.write(self.written(context)) or "Wrote"
         except (OSError, ValueError) as error:
             return report_error(self, error)
-        return report_done(self, f'Wrote "{Path(self.filepath).name}"')
+        return report_done(self, f'{words} "{Path(self.filepath).name}"')
 
 
 class TACTILE_OT_export_contacts(ObjectExport, bpy.types.Operator):
@@ -82,33 +99,76 @@ class TACTILE_OT_export_patch(ObjectExport, bpy.types.Operator):
         contact_file.write_patch(self.filepath, patch_record.reconstruction_of(patch))
 
 
-class TACTILE_OT_export_table(bpy.types.Operator, ExportHelper):  # type: ignore[misc]  # as above
+class TACTILE_OT_export_table(ObjectExport, bpy.types.Operator):
     """Write what all patches have found as CSV, one row a probe, in the scene's units"""
 
     bl_idname = "tactile.export_table"
     bl_label = "Export Table of Patches"
     filename_ext = ".csv"
-    if TYPE_CHECKING:
-        filepath: str
     filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
+    hint = "There is no patch to export: pick a reference point first"
     use_selection: BoolProperty(
         name="Selected Only", description="Write the selected probes and patches only", default=False
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        patches = patch_table.patches_of(context.view_layer.objects)
-        return polls(cls, patches, "There is no patch to export: pick a reference point first")
+    @staticmethod
+    def written(context: bpy.types.Context) -> list[Object]:
+        return patches_of(context.view_layer.objects)
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        objects = context.view_layer.objects
-        try:
-            patches = patch_table.patches_of(objects.selected if self.use_selection else objects)
-            patch_table.write(self.filepath, patches, context.scene)
-        except (OSError, ValueError) as error:
-            return report_error(self, error)
-        count, name = many(len(patches), "patch", "patches"), Path(self.filepath).name
-        return report_done(self, f'Wrote a table of {count}: "{name}"')
+    def write(self, patches: list[Object]) -> str:
+        if self.use_selection:
+            patches = patches_of(bpy.context.view_layer.objects.selected)
+        write_table(self.filepath, patches, bpy.context.scene)
+        return f"Wrote a table of {many(len(patches), 'patch', 'patches')}:"
+
+
+def patches_of(objects: Iterable[Object]) -> list[Object]:
+    """The patches among objects, or that belong to probes among them, by name."""
+    patches = {probe.patch_near(obj) for obj in objects} - {None}
+    return sorted((patch for patch in patches if probe.record_of(patch) is not None), key=lambda p: p.name)
+
+
+def write_table(path: str | Path, patches: Sequence[Object], scene: bpy.types.Scene) -> None:
+    """Writes a .csv with a header that names the unit, and a row for each patch; unknown fields are empty.
+
+    The row of a patch that was edited has only its name and a message. Raises ValueError if there are no
+    patches.
+    """
+    if not patches:
+        raise ValueError("There is no patch to export: pick a reference point first")
+    records = [probe.record_of(patch) for patch in patches]
+    unit = units.unit_of(scene, max(record["radius"] for record in records))
+    rows = [_row(*pair, unit) for pair in zip(patches, records, strict=True)]
+    text = io.StringIO()
+    table = csv.DictWriter(text, max(rows, key=len))  # Other ends of lines leave "\r" in a name unquoted.
+    table.writeheader()
+    table.writerows(rows)
+    whole_file.write_text(path, text.getvalue())
+
+
+def _row(patch: Object, record: Mapping[str, Any], unit: units.Unit) -> dict[str, str]:
+    """The row of a patch as a dict of headings and values."""
+    owner = probe.probe_of(patch)
+    named = {"probe": cell(owner.name) if owner else "", "patch": cell(patch.name)}
+    try:
+        with patch_record.reading(patch):
+            return named | _numbers(record, unit) | {key: cell(record[key]) for key in WORD_COLUMNS}
+    except ValueError as error:
+        return named | {"message": cell(str(error))}
+
+
+def _numbers(record: Mapping[str, Any], unit: units.Unit) -> dict[str, str]:
+    """The numbers of a report in words, by headings."""
+    numbers = {_heading("xyz"[i], 1, unit): x / unit[1] for i, x in enumerate(record["frame"]["origin"])}
+    numbers |= dict(zip(("nx", "ny", "nz"), record["frame"]["normal"], strict=True))
+    for key, power in NUMBER_POWERS.items():
+        numbers[_heading(key, power, unit)] = record[key] / unit[1] ** power if key in record else None
+    return {key: "" if value is None else f"{value:.9g}" for key, value in numbers.items()}
+
+
+def _heading(name: str, power: int, unit: units.Unit) -> str:
+    symbol = units.symbol(power, unit)
+    return f"{name} [{symbol}]" if symbol else name
 
 
 def draw_export(self: bpy.types.Menu, context: bpy.types.Context) -> None:

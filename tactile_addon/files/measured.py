@@ -152,21 +152,6 @@ def fit(
     if all_strokes:
         contacts = contacts._replace(contours=[], strokes=(*contacts.contours, *contacts.strokes))
     options |= {"noise": noise or None, "radius": radius or None}
-    try:
-        return _fit(source, contacts, point, outward, flip, normal_std, options)
-    except MemoryError:
-        raise ValueError("There are more contacts than fit into memory: use fewer of them") from None
-
-
-def _fit(
-    source: str,
-    contacts: core.Contacts,
-    point: Point | None,
-    outward: Point | None,
-    flip: bool,
-    normal_std: float,
-    options: dict[str, Any],
-) -> Touched:
     start = perf_counter()
     contours, unit, of_file, up, strokes = contacts
     point, outward = of_file if point is None else point, up if outward is None else outward

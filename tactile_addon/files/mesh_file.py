@@ -2,20 +2,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scenes and meshes in files, by Blender's own importers and exporter, without a window."""
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
 
 from ...core.arguments import many
-from ..touch.types import Object
-from . import mesh_numbers, ply_contacts, whole_file
+from ...core.contact_data.rows import POINT_COLUMNS
+from ..touch.types import Array, Object
+from . import contact_file, whole_file
 
-HEADER = 1 << 16  # The header of a .ply ends within this many bytes.
+STL_HEAD = 84  # The bytes of the head of a binary .stl; the last four are the number of triangles.
+STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+PLY_LINE = 65_000  # Longer lines in a .ply would end Blender.
+AFTER_WORD = (1, 2, 3)  # These words follow the one that begins the line of a vertex.
+LARGEST = float(np.finfo(np.float32).max)
 MOST_NAMES = 10  # A sentence lists no more meshes.
-INCOMPLETE = "Blender has not written all of it"
 # The operators that import files with these endings, and their options.
 IMPORTS = {
     ".ply": ("ply_import", {}),
@@ -76,14 +80,64 @@ def add(path: Path, empty: bool = False) -> list[Object]:
 def _require_readable(path: Path) -> None:
     """Raises OSError for a file that would end Blender, or of which Blender would read something else."""
     try:
-        wrong = mesh_numbers.unreadable(path)
+        is_wild = _has_wild_vertices(path)
     except ValueError as error:
         raise _unreadable(path) from error
-    if wrong:
+    if is_wild:
         raise OSError(
-            f'"{path.name}" has vertices whose coordinates are not finite in single precision, {wrong} of '
-            "them: correct or delete these"
+            f'"{path.name}" has vertices whose coordinates are not finite in single precision: correct or '
+            "delete these"
         )
+
+
+def _has_wild_vertices(path: Path) -> bool:
+    """Whether a .ply, .stl or .obj file has vertices whose coordinates are no finite float32 numbers.
+
+    It has none if it is a .stl or .obj file that is broken otherwise, which importers find. Raises ValueError
+    for a .ply file of whose vertices an importer might read something else.
+    """
+    data = path.read_bytes()
+    if path.suffix.lower() == ".ply":
+        return _of_ply(data)
+    try:
+        return {".stl": _of_stl, ".obj": _of_obj}[path.suffix.lower()](data)
+    except (ValueError, IndexError):
+        return False
+
+
+def _of_ply(data: bytes) -> bool:
+    rows, fields, is_text = contact_file.vertex_rows("", data)
+    lines = np.frombuffer(data, np.uint8, len(data) if is_text else data.find(b"end_header"))
+    if np.diff(np.flatnonzero(lines == ord("\n")), prepend=-1, append=len(lines)).max() > PLY_LINE:
+        raise ValueError
+    if not is_text:
+        return _are_wild(np.stack([rows[key] for key in POINT_COLUMNS], axis=1))
+    names = [name for name, _ in fields]
+    return _of_lines(rows, [names.index(key) for key in POINT_COLUMNS])
+
+
+def _of_stl(data: bytes) -> bool:
+    triangles = int.from_bytes(data[STL_HEAD - 4 : STL_HEAD], "little")
+    if len(data) == STL_HEAD + triangles * STL_TRIANGLE.itemsize:
+        return _are_wild(np.frombuffer(data, STL_TRIANGLE, triangles, STL_HEAD)["corners"])
+    return _of_lines([line for line in data.splitlines() if line.lstrip().startswith(b"vertex")], AFTER_WORD)
+
+
+def _of_obj(data: bytes) -> bool:
+    lines = map(bytes.lstrip, data.replace(b"\\\n", b" ").splitlines())  # A backslash continues a line.
+    return _of_lines([line for line in lines if line.startswith((b"v ", b"v\t"))], AFTER_WORD)
+
+
+def _of_lines(lines: Sequence[bytes], places: Sequence[int]) -> bool:
+    """Whether any line has not three finite numbers at these places."""
+    try:
+        return bool(lines) and _are_wild(np.loadtxt(lines, usecols=places, comments=None, ndmin=2))
+    except ValueError:  # Some line has a word in place of a number.
+        return True
+
+
+def _are_wild(points: Array) -> bool:
+    return not (np.abs(points) <= LARGEST).all()  # NaN fails every comparison.
 
 
 def _unreadable(path: Path) -> OSError:
@@ -95,18 +149,15 @@ def write(path: Path, obj: Object) -> None:
 
     Raises OSError with a sentence, as save_scene does; the old file is then as it was.
     """
-    with whole_file.replacing(path) as temporary:
-        with bpy.context.temp_override(selected_objects=[obj], window=bpy.context.window_manager.windows[0]):
-            bpy.ops.wm.ply_export(
-                filepath=str(temporary),
-                export_selected_objects=True,
-                apply_modifiers=False,
-                export_attributes=True,
-                export_uv=False,  # Seams would split vertices.
-            )
-        # On a full disk the exporter reports success.
-        if temporary.stat().st_size < _size_of_ply(temporary, obj.data):
-            raise OSError(INCOMPLETE)
+    seen: Any = {"selected_objects": [obj], "window": bpy.context.window_manager.windows[0]}
+    with whole_file.replacing(path) as temporary, bpy.context.temp_override(**seen):
+        bpy.ops.wm.ply_export(
+            filepath=str(temporary),
+            export_selected_objects=True,
+            apply_modifiers=False,
+            export_attributes=True,
+            export_uv=False,  # Seams would split vertices.
+        )
 
 
 def save_scene(path: Path) -> None:
@@ -115,32 +166,4 @@ def save_scene(path: Path) -> None:
         try:
             bpy.ops.wm.save_as_mainfile(filepath=str(temporary), copy=True)
         except RuntimeError as error:  # If the disk is full, Blender says that there is no such file.
-            raise OSError(INCOMPLETE) from error
-        if not _is_whole_blend(temporary):  # On a full disk Blender 5.2 reports success.
-            raise OSError(INCOMPLETE)
-
-
-def _is_whole_blend(path: Path) -> bool:
-    """Whether a file ends as a .blend does: with the magic number of its table of frames, or with ENDB."""
-    with path.open("rb") as file:
-        start = file.read(4)
-        file.seek(max(0, path.stat().st_size - 64))
-        end = file.read()
-    return end.endswith(b"\xb1\xea\x92\x8f") if start == b"\x28\xb5\x2f\xfd" else b"ENDB" in end
-
-
-def _size_of_ply(path: Path, mesh: bpy.types.Mesh) -> int:
-    """The size that the header of a .ply with the faces of `mesh` promises; huge without a header."""
-    with path.open("rb") as file:
-        head, end, _ = file.read(HEADER).partition(b"end_header\n")
-    if not end:
-        return sys.maxsize
-    size, count = len(head) + len(end), 0
-    for words in map(str.split, head.decode("latin-1").splitlines()):
-        if words[0] == "element":
-            count = int(words[2])
-        elif words[:2] == ["property", "list"]:
-            size += count + 4 * len(mesh.loops)
-        elif words[0] == "property":
-            size += count * np.dtype(ply_contacts.PLY_TYPES[words[1]]).itemsize
-    return size
+            raise OSError("Blender has not written all of it") from error

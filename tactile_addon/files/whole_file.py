@@ -6,13 +6,11 @@ import errno
 import os
 import secrets
 import shutil
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 UNFINISHED = ".unfinished"  # This is before the suffix of files that are being written.
-STALE = 3600.0  # A process that has not written to such a file for this many seconds was killed.
 
 
 @contextmanager
@@ -20,7 +18,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
     """The path of a file that replaces `path` once it is written, at the end of the block.
 
     Raises OSError, with a sentence, if that fails. The old file is then as it was, and nothing is next to it.
-    If this process is killed, the hidden file stays until `path` is written another time, an hour later.
+    If this process is killed, a hidden file stays.
     """
     if Path(path).exists() and not Path(path).is_file():
         raise OSError(f'"{path}" is not a file that can be replaced: choose another name')
@@ -28,14 +26,17 @@ def replacing(path: str | Path) -> Iterator[Path]:
         target = Path(path).resolve()  # A link stays, and its target is replaced.
     except RuntimeError as error:  # Links point to each other.
         raise OSError(f'cannot write "{Path(path).name}" ({error}): choose another place') from error
-    stem, ending = f".{target.stem[:40]}-", f"{UNFINISHED}{target.suffix[:40]}"
-    _sweep(target.parent, stem, ending)
-    temporary = target.with_name(f"{stem}{secrets.token_hex(4)}{ending}")
+    name = f".{target.stem[:40]}-{secrets.token_hex(4)}{UNFINISHED}{target.suffix[:40]}"
+    temporary = target.with_name(name)
     try:
         temporary.touch()  # Blender's exporters do not tell why they cannot,
         temporary.unlink()  # and keep a file that is there.
         yield temporary
         with temporary.open("rb+") as file:
+            size = file.seek(0, os.SEEK_END)
+            file.write(b"\0")  # On a full disk Blender reports success, but there is no room for this byte.
+            file.flush()
+            file.truncate(size)
             os.fsync(file.fileno())
         if target.exists():
             shutil.copymode(target, temporary)
@@ -49,15 +50,6 @@ def replacing(path: str | Path) -> Iterator[Path]:
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
-
-
-def _sweep(folder: Path, start: str, end: str) -> None:
-    """Removes files with such names that nobody writes any more."""
-    with suppress(OSError), os.scandir(folder) as found:
-        for left in found:
-            of_mine = left.name.startswith(start) and left.name.endswith(end)
-            if of_mine and time.time() - left.stat().st_mtime > STALE:
-                os.unlink(left)
 
 
 def write_text(path: str | Path, text: str) -> None:

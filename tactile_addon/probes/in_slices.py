@@ -10,11 +10,11 @@ from typing import Any, TypeAlias
 import bpy
 from bpy.props import BoolProperty
 
-from ..touch.settings import TARGET, UNSAVED
-from ..touch.types import OperatorMixin, Outcome
+from ..touch.settings import TARGET, UNSAVED, draw_chosen
+from ..touch.types import Object, OperatorMixin, Outcome
 from ..touch.units import duration
 from ..touch.wording import sentence
-from .operators import report_error, target_object, waiting
+from .operators import has_target, is_in_object_mode, report_error, target_object, waiting
 
 # These are seconds.
 FIRST_SLICE = 0.2  # Work that takes no longer is done without slices.
@@ -51,6 +51,7 @@ class InSlices(OperatorMixin):
     stop = "Stop"  # What Esc does,
     stopped = "Stopped: the patch stays as it was"  # and what is reported then.
     meanwhile = {"RUNNING_MODAL"}  # What modal() returns for all other events.
+    shown: tuple[str, ...] = ()  # The settings in its dialog; "target" is the name of an object.
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         try:
@@ -143,6 +144,16 @@ class InSlices(OperatorMixin):
         self.report({"INFO"}, self.stopped)
         return {"CANCELLED"}
 
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draws the settings that are `shown`."""
+        layout = self.layout
+        layout.use_property_split, layout.use_property_decorate = True, False
+        for name in self.shown:
+            if name == "target":
+                layout.prop_search(self, name, context.scene, "objects")
+            else:
+                draw_chosen(layout, self, name)
+
     def _leave(self, context: bpy.types.Context) -> None:
         """Removes everything that shows that it is going on."""
         if self._timer is not None:
@@ -200,13 +211,15 @@ def redraw_sidebars(context: bpy.types.Context) -> None:
 class AllOver(InSlices):
     """For operators that touch a mesh all over to inherit; a dialog names the mesh before they begin.
 
-    Each has `_about(context)`, a sentence on what it will take, which may raise ValueError, with a sentence.
+    Each has `_estimate(context, target)`, a sentence on what it will take, which may raise ValueError, with a
+    sentence.
     """
 
     target: TARGET
 
     meanwhile = {"PASS_THROUGH"}  # The scene may change, because a detached mesh is touched.
-    _about: Callable[[bpy.types.Context], str]
+    _estimate: Callable[[bpy.types.Context, Object], str]
+    _known: tuple[Any, str] = (None, "")  # What was estimated last, after what it depends on.
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         try:
@@ -217,13 +230,25 @@ class AllOver(InSlices):
             return report_error(self, error)
         return self._confirm(context, "Touch")
 
-    def _draw_target(self, context: bpy.types.Context) -> None:
-        """Draws the mesh and what it will take."""
-        layout = self.layout
-        layout.use_property_split, layout.use_property_decorate = True, False
-        layout.prop_search(self, "target", context.scene, "objects")
+    def _about(self, context: bpy.types.Context) -> str:
+        """A sentence on what it will take with these settings, made once: a dialog is drawn often."""
+        target = target_object(context, self.target)
+        mesh = target.evaluated_get(context.evaluated_depsgraph_get()).data
+        vertices = len(getattr(mesh, "vertices", ()))  # A modifier may have been added.
+        given = target.session_uid, vertices, *(getattr(self, name) for name in self.shown)
+        if given != self._known[0]:
+            self._known = given, self._estimate(context, target)
+        return self._known[1]
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return is_in_object_mode(cls, context, "Objects are touched") and has_target(cls, context)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draws the settings, and what it will take with them."""
+        super().draw(context)
         try:
             words = self._about(context)
         except ValueError as error:
             words = sentence(error)
-        layout.label(text=words, translate=False)
+        self.layout.label(text=words, translate=False)

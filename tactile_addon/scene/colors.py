@@ -19,13 +19,7 @@ UNKNOWN = (0.5, 0.5, 0.5, 1.0)  # The color of what has no value, in sRGB.
 
 def symmetric_range(values: Array, floor: float) -> float:
     """The r of a scale -r..r: the 98th percentile of |values|, so a few wild ones do not bleach the rest."""
-    if not len(values):
-        return floor
-    sizes, at = np.abs(values), 0.98 * (len(values) - 1)  # np.percentile would take five times as long.
-    before = int(at)
-    sizes.partition([before, min(before + 1, len(sizes) - 1)])
-    one, other = sizes[before], sizes[min(before + 1, len(sizes) - 1)]
-    return max(float(one + (at - before) * (other - one)), floor)
+    return max(float(np.percentile(np.abs(values), 98)), floor) if len(values) else floor
 
 
 def shades(values: ArrayLike, limit: float) -> Array:
@@ -35,21 +29,3 @@ def shades(values: ArrayLike, limit: float) -> Array:
         [np.interp(at, np.linspace(-1.0, 1.0, len(COLOR_STOPS)), stop) for stop in COLOR_STOPS.T]
     )
     return np.column_stack([srgb, np.ones(len(srgb))])
-
-
-def diverging(values: ArrayLike, limit: float, unknown: ArrayLike = ()) -> Array:
-    """The colors of shades(), but as linear RGBA (n, 4), as Blender stores them.
-
-    unknown : (k,), indices of values that are not known, which get the gray UNKNOWN instead
-    """
-    rgba = shades(values, limit)
-    rgba[np.asarray(unknown, dtype=int)] = UNKNOWN
-    return linear(rgba)
-
-
-def linear(rgba: ArrayLike) -> Array:
-    """The linear RGBA of colors in sRGB, (n, 4)."""
-    rgba = np.array(rgba)
-    srgb = rgba[:, :3]
-    rgba[:, :3] = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-    return rgba

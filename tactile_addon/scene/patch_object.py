@@ -12,10 +12,23 @@ from mathutils import Matrix
 from ... import core
 from ..touch.touch_object import Touched
 from ..touch.types import Array, Object
-from .attributes import COLOR, DEVIATION, GAUSSIAN_STD, HEIGHT_STD, NORMAL, PLACE, POSITION
 from .curves import CURVES, curves_of
 from .family import add
-from .mesh_data import ABOVE, emission, fill, own_mesh, values, write
+from .mesh_data import (
+    ABOVE,
+    COLOR,
+    DEVIATION,
+    GAUSSIAN_STD,
+    HEIGHT_STD,
+    NORMAL,
+    PLACE,
+    POSITION,
+    emission,
+    fill,
+    own_mesh,
+    values,
+    write,
+)
 from .patch_record import (
     QUANTITIES_OF_A_FIT,
     RECONSTRUCTION,
@@ -32,7 +45,6 @@ COLLECTION = "Tactile Patches"
 # It is drawn above the mesh by as much as it may be below it: by these shares of its radius at least and at
 # most, and by this multiple of its height's deviation until it is compared with the mesh.
 DRAWN_ABOVE, MOST_ABOVE, DEVIATIONS = 5e-3, 0.12, 3.0
-STEEP = 1.7  # Where a patch is steep, it has to go up by more, by this factor.
 
 
 def insert(scene: bpy.types.Scene, touched: Touched, parent: Object | None = None) -> Object:
@@ -41,7 +53,7 @@ def insert(scene: bpy.types.Scene, touched: Touched, parent: Object | None = Non
     patch: Object = bpy.data.objects.new(name, bpy.data.meshes.new(name))
     patch.show_in_front = True  # It would lie in the surface it describes.
     collection(scene).objects.link(patch)
-    patch.data.materials.append(emission("Tactile Curvature", attribute=COLOR, upright=True))
+    patch.data.materials.append(emission("Tactile Curvature", COLOR))
     note_added(patch)
     patch.parent = parent
     add(patch)
@@ -92,8 +104,8 @@ def _above(patch: Object, touched: Touched) -> float:
     """How far above the mesh a patch is drawn where it would lie in it."""
     radius, deepest = touched.result.radius, DEVIATIONS * touched.report["height_std"]
     if touched.report["is_verified"] and touched.surface is not None:
-        deepest = max(deepest, -STEEP * float(values(patch.data, DEVIATION).min()))
-    return min(max(deepest, DRAWN_ABOVE * radius), MOST_ABOVE * radius)
+        deepest = max(deepest, -float(values(patch.data, DEVIATION).min()))
+    return min(deepest + DRAWN_ABOVE * radius, MOST_ABOVE * radius)
 
 
 def collection(scene: bpy.types.Scene) -> bpy.types.Collection:

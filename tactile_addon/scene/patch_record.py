@@ -13,7 +13,7 @@ from mathutils import Matrix
 from ... import core
 from ..touch.touch_report import TouchReport
 from ..touch.types import Array, Object
-from .attributes import COLOR, CORNERS, CURVATURES, DEVIATION, DOMAIN, HEIGHT_STD, attribute_of
+from .mesh_data import COLOR, CORNERS, CURVATURES, DEVIATION, DOMAIN, HEIGHT_STD, attribute_of
 
 # Custom properties of objects.
 RECORD = "tactile"  # The report of a patch.

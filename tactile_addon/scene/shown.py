@@ -19,11 +19,9 @@ from ... import core
 from ..touch import units
 from ..touch.arrays import read_array
 from ..touch.types import Array, Object
-from ..touch.units import Unit
 from . import colors
-from .attributes import COLOR, CURVATURE_STD, CURVATURES, POSITION
 from .family import all_objects
-from .mesh_data import own_mesh, values
+from .mesh_data import COLOR, CURVATURE_STD, CURVATURES, POSITION, own_mesh, values
 from .patch_record import ATLAS_RECORD, COMMON_RANGE, POWERS, RANGE, RECORD, is_colored, report_of
 
 LEAST_BEND = 1e-2  # Curvatures have no smaller range than this, in units of the object's size,
@@ -41,10 +39,9 @@ def recolor(obj: Object) -> None:
     own_mesh(obj)
     shown, mesh, record = obj.tactile_colors, obj.data, _record(obj)
     limit = obj.get(RANGE) or _automatic_range(obj, record, shown)
-    shades = values(mesh, shown)
-    rgba = colors.diverging(np.append(shades, 0.0), limit, [len(shades)])
-    at = np.arange(len(shades)) if RECORD in obj else _corners_shown(mesh, shown, record["edge"])
-    mesh.attributes[COLOR].data.foreach_set("color", rgba[at].ravel())
+    rgba = np.vstack([colors.shades(values(mesh, shown), limit), colors.UNKNOWN])
+    at = np.arange(len(mesh.vertices)) if RECORD in obj else _corners_shown(mesh, shown, record["edge"])
+    mesh.attributes[COLOR].data.foreach_set("color_srgb", rgba[at].ravel())
     record["is_gray"] = bool((at < 0).any())
     if mesh.color_attributes.active_color_name != COLOR or mesh.color_attributes.default_color_name != COLOR:
         mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
@@ -117,7 +114,7 @@ def _record(obj: Object) -> Any:
     return obj[ATLAS_RECORD] if ATLAS_RECORD in obj else report_of(obj)
 
 
-def unit_of_range(obj: Object, scene: bpy.types.Scene) -> tuple[int, Unit]:
+def unit_of_range(obj: Object, scene: bpy.types.Scene) -> tuple[int, units.Unit]:
     """The power of length in the quantity that a patch or whole object shows, and the unit of its legend."""
     report, power = _record(obj), POWERS[obj.tactile_colors]
     return power, ("", 1.0) if report is None else units.unit_of_report(scene, report)

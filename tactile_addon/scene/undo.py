@@ -58,12 +58,11 @@ def take_out(*_: Any) -> None:
             _links.append((_set_parent, child.session_uid, obj.session_uid))
             child.parent = None
     for number, above in _collections().items():
-        for obj in [obj for obj in above.objects if obj.session_uid in _added]:
-            _links.append((_link_object, obj.session_uid, number))
-            above.objects.unlink(obj)
-        for collection in [child for child in above.children if child.session_uid in _added]:
-            _links.append((_link_collection, collection.session_uid, number))
-            above.children.unlink(collection)
+        kinds: Any = above.objects, above.children
+        for links in kinds:
+            for block in [block for block in links if block.session_uid in _added]:
+                _links.append((_link, block.session_uid, number))
+                links.unlink(block)
     _give_back_meshes()
 
 
@@ -98,14 +97,10 @@ def _set_parent(child: Object, parent: Object) -> None:
         child.parent = parent
 
 
-def _link_object(obj: Object, collection: bpy.types.Collection) -> None:
-    if not obj.users_collection:
-        collection.objects.link(obj)
-
-
-def _link_collection(collection: bpy.types.Collection, above: bpy.types.Collection) -> None:
-    if collection.name not in above.children:
-        above.children.link(collection)
+def _link(block: Object | bpy.types.Collection, above: bpy.types.Collection) -> None:
+    links: Any = above.objects if isinstance(block, bpy.types.Object) else above.children
+    if links.get(block.name) != block:
+        links.link(block)
 
 
 def _collections() -> dict[int, bpy.types.Collection]:

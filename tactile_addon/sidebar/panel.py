@@ -8,15 +8,15 @@ from typing import Any
 import bpy
 from bpy.app.translations import pgettext_iface as iface
 
-from ..comparison.verification_wording import verification_rows, verification_table
+from ..comparison.verify_operator import verification_rows, verification_table
 from ..probes import probe
 from ..probes.in_slices import draw_running
 from ..probes.operators import NO_MESH
 from ..scene import patch_record
 from ..scene.shown import unit_of_range
 from ..scene.viewports import shows_colors
-from ..stability_map.map_report import facets as map_facets
-from ..stability_map.map_report import map_rows, median_rows
+from ..stability_map.map_object import facets as map_facets
+from ..stability_map.map_object import map_rows, median_rows
 from ..touch import units
 from ..touch.settings import draw_chosen, draw_fit, draw_noise
 from ..touch.touch_report import TouchReport

@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A stability map as an object: a painted copy of the mesh that was touched."""
+"""A stability map as an object, a painted copy of the mesh that was touched, and what is said of it."""
 
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import bpy
@@ -10,17 +11,29 @@ from bpy.props import EnumProperty
 from mathutils import Matrix, Vector
 
 from ... import core
+from ...core.arguments import many
 from ..scene import colors, patch_object, patch_record
-from ..scene.attributes import CORNERS, HEIGHT_STD, MAP_COLOR, MEASURES, REASON, TOUCH
-from ..scene.mesh_data import ABOVE, emission, fill, write
+from ..scene.mesh_data import (
+    ABOVE,
+    CORNERS,
+    HEIGHT_STD,
+    MAP_COLOR,
+    MEASURES,
+    REASON,
+    TOUCH,
+    emission,
+    fill,
+    write,
+)
 from ..scene.shown import LEAST_LENGTH
 from ..scene.viewports import show_colors
+from ..touch import units
 from ..touch.arrays import read_array
 from ..touch.settings import MOST_PLANES
 from ..touch.types import Array, Object
+from ..touch.wording import fit
 from .stability import NOTHING, REASON_KEYS, REASONS, StabilityMap
 
-SHADES = 256
 PLACES = "tactile_places"  # The points that were touched, in the axes of the map: three numbers each,
 VALUES = "tactile_values"  # and what was found there, by the names of the attributes, with
 AREA = "area"  # the area in the world that has the color of each.
@@ -48,8 +61,7 @@ MAP_QUANTITIES = [
     ("blind_share", "Blind Share", "Share of the ways to bend that the planes cannot show", 0),
 ]
 LOGARITHMIC = ("condition_number",)  # These have a logarithmic scale from 1.
-# The range reaches at least to where the typical patch, that of the median by area, would be in doubt: this
-# multiple of that quantity.
+# The range reaches at least to where the median patch would be in doubt: this multiple of that quantity.
 DOUBTFUL = {"error": (core.CONTRADICTING, HEIGHT_STD), HEIGHT_STD: (core.DOUBTFUL_STD, "reach")}
 REVERSED = ("reach",)  # Of these much is good, so that red is little: red is bad on every map.
 MAP_POWERS = {name: power for name, _, _, power in MAP_QUANTITIES}
@@ -59,6 +71,8 @@ REASON_COLORS = np.array([
     (0.93, 0.93, 0.93, 1.0), (0.94, 0.89, 0.26, 1.0), (0.84, 0.37, 0.0, 1.0),
     (0.0, 0.45, 0.70, 1.0), (0.0, 0.62, 0.45, 1.0), REFUSED,
 ])  # fmt: skip
+
+FACETED = 0.5  # The share of the patches from which on a map says that they follow facets.
 
 
 def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Object:
@@ -74,7 +88,7 @@ def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Ob
     # because patches that lie in it are.
     painted[ABOVE] = SHOWN_ABOVE * float(np.linalg.norm(np.ptp(touched.points, axis=0)))
     painted[PLACES] = np.ravel(touched.places[: touched.done]).tolist()
-    mesh.materials.append(emission("Tactile Stability", attribute=MAP_COLOR))
+    mesh.materials.append(emission("Tactile Stability", MAP_COLOR))
     painted[VALUES] = {name: touched.measures[name].tolist() for name in MEASURES}
     painted[VALUES].update({REASON: touched.reason.tolist(), AREA: areas.tolist()})
     painted[patch_record.MAP_RECORD] = touched.report() | {"source": obj.name, "painted": painted.name}
@@ -102,43 +116,32 @@ def _paint(mesh: bpy.types.Mesh, touched: StabilityMap) -> Array:
 def recolor(painted: Object) -> None:
     """Colors the map by the quantity that it is set to show, and keeps the range in its record."""
     shown, mesh, record = painted.tactile_map_colors, painted.data, painted[patch_record.MAP_RECORD]
-    values = np.array(painted[VALUES][shown])[
-        read_array(mesh.attributes[TOUCH].data, "value", dtype=np.int32)
-    ]
+    found = np.array(painted[VALUES][shown])
     if shown == REASON:
-        rgba, limit = colors.linear(REASON_COLORS)[values.astype(np.intp)], len(REASON_KEYS) - 1.0
+        rgba, limit = REASON_COLORS[found.astype(np.intp)], len(REASON_KEYS) - 1.0
     else:
-        limit = _limit(shown, values[values != NOTHING], _least_range(painted, shown))
-        table = colors.diverging(np.arange(SHADES), SHADES - 1)
-        table = np.vstack([table, colors.linear([REFUSED])])
-        share = np.maximum(values, 1.0 if shown in LOGARITHMIC else 0.0)
-        share = np.log(share) / np.log(limit) if shown in LOGARITHMIC else share / limit
-        share = np.minimum(share, 1.0)
-        place = ((1.0 - share if shown in REVERSED else share) * (SHADES - 1) + 0.5).astype(np.int32)
-        rgba = table[np.where(values == NOTHING, SHADES, place)]
-    mesh.attributes[MAP_COLOR].data.foreach_set("color", rgba.astype(np.float32).ravel())
+        limit = _limit(painted, shown, found[found != NOTHING])
+        share = found / limit
+        if shown in LOGARITHMIC:
+            share = np.log(np.maximum(found, 1.0)) / np.log(limit)
+        share = np.clip(share, 0.0, 1.0)
+        rgba = colors.shades(1.0 - share if shown in REVERSED else share, 1.0)
+        rgba[found == NOTHING] = REFUSED
+    touch = read_array(mesh.attributes[TOUCH].data, "value", dtype=np.int32)
+    mesh.attributes[MAP_COLOR].data.foreach_set("color_srgb", rgba[touch].ravel())
     mesh.update()
     record["color_limit"] = limit
 
 
-def _limit(shown: str, values: Array, floor: float) -> float:
-    """The end of the colors' range."""
+def _limit(painted: Object, shown: str, values: Array) -> float:
+    """The end of the colors' range for values (n,), such that red stands for what is bad."""
     if shown == "blind_share":
         return 1.0
-    return colors.symmetric_range(values, floor) if len(values) else floor
-
-
-def _least_range(painted: Object, shown: str) -> float:
-    """The smallest range of colors of a quantity, so that red stands for what is bad."""
     if shown in LOGARITHMIC:
-        return 10.0
-    least = LEAST_LENGTH * painted[patch_record.MAP_RECORD]["spacing"]
-    times, other = DOUBTFUL.get(shown, (0.0, shown))
-    values = np.array(painted[VALUES][other])
-    order = np.argsort(values)
-    areas = np.cumsum(np.where(values == NOTHING, 0.0, painted[VALUES][AREA])[order])
-    median = float(values[order[np.searchsorted(areas, 0.5 * areas[-1])]])
-    return max(least, times * median) if areas[-1] else least
+        return colors.symmetric_range(values, 10.0)
+    record, (times, other) = painted[patch_record.MAP_RECORD], DOUBTFUL.get(shown, (0.0, shown))
+    least = max(LEAST_LENGTH * record["spacing"], times * record.get(f"{other}_median", 0.0))
+    return colors.symmetric_range(values, least)
 
 
 def swatches(painted: Object) -> list[tuple[str, tuple[float, ...]]]:
@@ -187,6 +190,74 @@ def inputs_of(painted: Object) -> dict[str, Any]:
         "degree": 0 if record["degree"] == "auto" else record["degree"],
         "weight": record.get("weight") or 0.0,
     }
+
+
+def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """(label, value) of everything there is to say of a map."""
+    unit = units.unit_of_report(bpy.context.scene, record)
+    names = ("spacing", "extent", "step")
+    lengths = [units.say(record[name], 1, unit) if record[name] else "auto" for name in names]
+    return [
+        (
+            "touched",
+            f"{record['source']}, at {record['touched']} of {many(record['points'], 'point', 'points')}",
+        ),
+        ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
+        ("refused", ", ".join(_refused(record)) or "none"),
+        ("fit", fit(record)),
+        (", ".join(names), ", ".join(lengths)),
+        *((f"median {title.lower()}", value) for title, value in median_rows(record, unit)),
+    ]
+
+
+def map_summary(record: Mapping[str, Any]) -> str:
+    """A sentence on what a stability map has found."""
+    patches = many(record["patches"], "patch", "patches")
+    words = f"{patches} at {many(record['touched'], 'point', 'points')}, {record['in_doubt']} in doubt"
+    refused = _refused(record)
+    return f"{words}; refused: {', '.join(refused)}" if refused else words
+
+
+def _refused(record: Mapping[str, Any]) -> list[str]:
+    """How many points were refused, for each reason."""
+    names = {key: name for key, name, _ in REASONS}
+    return [f"{count} {names[key]}" for key, count in record["refused"].items() if count]
+
+
+def map_rows(record: Mapping[str, Any], unit: units.Unit) -> list[tuple[str, str]]:
+    """(label, value) of how many patches a stability map has, and of the reasons why there are not more."""
+    names, refused = {key: name for key, name, _ in REASONS}, [*record["refused"].items()]
+    return [
+        ("Points", _points(record)),
+        ("Spacing", units.say(record["spacing"], 1, unit)),
+        ("Patches", str(record["patches"])),
+        ("… in Doubt", str(record["in_doubt"])),
+        *([("… on Facets", str(record["few_facets"]))] if record.get("few_facets") else []),
+        *([("No Patch", str(sum(count for _, count in refused)))] if refused else []),
+        *((names[key], str(count)) for key, count in refused if count),
+    ]
+
+
+def _points(record: Mapping[str, Any]) -> str:
+    touched, points = record["touched"], record["points"]
+    return str(points) if touched == points else f"{touched} of {points}"
+
+
+def facets(record: Mapping[str, Any]) -> str | None:
+    """A sentence if half of the patches or more follow facets, as the verdict on a patch has it; or None."""
+    count = record.get("few_facets", 0)
+    if count < max(FACETED * record["patches"], 1):
+        return None
+    return f"Curvature of the facets, not of the shape, at {many(count, 'point', 'points')}"
+
+
+def median_rows(record: Mapping[str, Any], unit: units.Unit) -> Iterator[tuple[str, str]]:
+    """(label, value) of the medians over the patches of a stability map that are known."""
+    for name, title, _, power in MAP_QUANTITIES:
+        if f"{name}_median" in record:
+            found = record[f"{name}_median"]
+            # In single precision a little is left of 0.
+            yield title, units.say(units.rounded(found, power, record["spacing"]), power, unit)
 
 
 def _show(obj: Object, context: bpy.types.Context) -> None:

@@ -7,26 +7,12 @@ import bpy
 from ...core.arguments import many
 from ..probes import probe
 from ..probes.in_slices import AllOver, Progress
-from ..probes.operators import (
-    has_target,
-    is_in_object_mode,
-    make_active,
-    report_done,
-    target_object,
-)
+from ..probes.operators import make_active, report_done, target_object
 from ..scene import patch_record
 from ..touch import units
-from ..touch.settings import (
-    NAMES,
-    TouchSettings,
-    draw_chosen,
-    draw_noise,
-    length_property,
-    touch_arguments,
-)
-from ..touch.types import Outcome
+from ..touch.settings import NAMES, TouchSettings, length_property, touch_arguments
+from ..touch.types import Object, Outcome
 from . import map_object
-from .map_report import map_summary
 from .stability import StabilityMap, expected_count, seconds_each
 
 
@@ -44,11 +30,7 @@ class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
     )
 
     stop = "Stop and Keep"
-    _counted: tuple[object, str] = (None, "")  # What was said last, after what it depends on.
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return is_in_object_mode(cls, context, "Maps are made") and has_target(cls, context)
+    shown = ("target", "spacing", "extent", "noise", "seed")  # All else is as the active probe has it.
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
@@ -85,22 +67,12 @@ class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
         painted = map_object.insert(context, target, self._map)
         make_active(context, painted)
         record = painted[patch_record.MAP_RECORD].to_dict()
-        return report_done(self, map_summary(record), record["patches"] > 0)
+        return report_done(self, map_object.map_summary(record), record["patches"] > 0)
 
-    def _about(self, context: bpy.types.Context) -> str:
+    def _estimate(self, context: bpy.types.Context, target: Object) -> str:
         """A sentence on what will be touched at how many points."""
-        target = target_object(context, self.target)
-        given = target.session_uid, self.extent, self.spacing, self.noise
-        if given != self._counted[0]:  # A dialog is drawn often.
-            depsgraph = context.evaluated_depsgraph_get()
-            count = expected_count(target, depsgraph, self.extent, self.spacing)
-            seconds = count * seconds_each(target, depsgraph, touch_arguments(self))
-            words = f"about {many(units.rough(count), 'touch', 'touches')}, {units.duration(seconds)}"
-            self._counted = given, f"{target.name}: {words}"
-        return self._counted[1]
-
-    def draw(self, context: bpy.types.Context) -> None:
-        self._draw_target(context)
-        for name in ("spacing", "extent"):  # All else is as the active probe has it.
-            draw_chosen(self.layout, self, name)
-        draw_noise(self.layout, self)
+        depsgraph = context.evaluated_depsgraph_get()
+        count = expected_count(target, depsgraph, self.extent, self.spacing)
+        seconds = count * seconds_each(target, depsgraph, touch_arguments(self))
+        words = f"about {many(units.rough(count), 'touch', 'touches')}, {units.duration(seconds)}"
+        return f"{target.name}: {words}"

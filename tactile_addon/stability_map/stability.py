@@ -12,8 +12,8 @@ import bpy
 import numpy as np
 
 from ... import core
-from ...core.triangles import triangle_cross
-from ..scene.attributes import MEASURES
+from ...core.triangles import cut_to_edges, triangle_cross
+from ..scene.mesh_data import MEASURES
 from ..touch.arrays import read_array
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.evaluated_mesh import evaluated_object, size_of
@@ -27,7 +27,7 @@ MOST_TOUCHES = 1_000_000  # They take hours, and the places among which they are
 TRIED_SPACING = 1.0 / 4.0  # Touches that are timed are so far apart, as a share of the object's size.
 BATCH = 20  # The number of touches that are fitted at once, in some hundredths of a second.
 GROWING_BATCH = 4  # Touches that choose their extent are fewer, because their fits have more contacts.
-NEAREST_AT_ONCE = 10_000  # The number of vertices that get their nearest touch at once.
+NEAREST_AT_ONCE = 10_000  # The number of triangles or vertices that get their nearest touch at once.
 NOTHING = -1.0  # Each quantity has this value where there is no patch.
 # The values of the attribute `reason`: key, name, and the stop of a curve that it follows from.
 REASONS = [
@@ -76,8 +76,8 @@ class StabilityMap:
     measures, reason : (n,), what was found by each touch; the fields of `measures` are MEASURES
     points, triangles, owners : (k, 3), (m, 3) and (m,), the mesh that is painted, and its triangles' faces
     areas : those of the triangles
-    touch_in : index of the touch nearest to the middle of each triangle, once the steps are done
-    touch_of : that of the largest triangle at each vertex, or the nearest to a vertex without faces
+    touch_in, touch_of : the indices of the touches nearest to the middle of each triangle and to each vertex,
+        once the steps are done
     """
 
     def __init__(
@@ -125,7 +125,9 @@ class StabilityMap:
 
     def steps(self) -> Iterator[None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
-        self.points, self.triangles, self.owners = _cut(self.surface, self.spacing)
+        self.points, self.triangles, self.owners = cut_to_edges(
+            self.surface.points, self.surface.triangles, self.surface.owners, self.spacing
+        )
         corners = self.points[self.triangles]
         self._middles = corners.mean(axis=1)
         self.areas = 0.5 * np.linalg.norm(triangle_cross(corners), axis=1)
@@ -151,17 +153,14 @@ class StabilityMap:
         from scipy.spatial import cKDTree
 
         tree = cKDTree(self.places[: self.done])
-        self.touch_in = np.empty(len(self._middles), dtype=np.intp)
-        for start in range(0, len(self._middles), NEAREST_AT_ONCE):
-            some = slice(start, start + NEAREST_AT_ONCE)
-            self.touch_in[some] = tree.query(self._middles[some])[1]
-            yield
-        # Touches in narrow faces would color wide ones that share all vertices with them, as on a plate.
-        self.touch_of = np.full(len(self.points), -1)
-        order = np.argsort(self.areas, kind="stable")
-        self.touch_of[self.triangles[order].ravel()] = np.repeat(self.touch_in[order], 3)
-        loose = self.touch_of < 0
-        self.touch_of[loose] = tree.query(self.points[loose])[1]
+        self.touch_in, self.touch_of = (
+            np.empty(len(at), dtype=np.intp) for at in (self._middles, self.points)
+        )
+        for nearest, places in ((self.touch_in, self._middles), (self.touch_of, self.points)):
+            for start in range(0, len(places), NEAREST_AT_ONCE):
+                some = slice(start, start + NEAREST_AT_ONCE)
+                nearest[some] = tree.query(places[some])[1]
+                yield
 
     def _touch(self, numbers: Sequence[int]) -> Iterator[None]:
         """Makes the touches with these numbers, as a generator like `steps`."""
@@ -248,47 +247,11 @@ def _reason_of(stops: Iterable[str]) -> int:
     return STOP_CODES[counts.most_common(1)[0][0] if counts else core.CREASE]
 
 
-def _cut(surface: DetachedMesh, longest: float) -> tuple[Array, Array, Array]:
-    """Points (n, 3), triangles (m, 3) and their faces (m,) of a mesh, cut until no edge is longer than that.
-
-    Triangles are halved at the middle of their longest edge. A neighbor may not be, which leaves no gap, as
-    triangles are flat.
-    """
-    points, triangles, owners = surface.points, surface.triangles, surface.owners
-    while True:
-        corners = points[triangles]
-        sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
-        large = sides.max(axis=1) > longest
-        if not large.any():
-            return points, triangles, owners
-        first = sides[large].argmax(axis=1)[:, None]
-        a, b, c = np.take_along_axis(triangles[large], (first + np.arange(3)) % 3, axis=1).T
-        ends, number = np.unique(np.sort(np.column_stack([a, b]), axis=1), axis=0, return_inverse=True)
-        middle = len(points) + number.ravel()
-        points = np.vstack([points, points[ends].mean(axis=1)])
-        halves = [triangles[~large], np.column_stack([a, middle, c]), np.column_stack([middle, b, c])]
-        triangles = np.vstack(halves).astype(np.int32)
-        owners = np.concatenate([owners[~large], owners[large], owners[large]])
-
-
-class _Plane:
-    """The plane z = 0 as a surface."""
-
-    def ray_cast(
-        self, origin: Sequence[float], direction: Sequence[float], distance: float
-    ) -> tuple[Sequence[float], Sequence[float]] | None:
-        """The point and the normal where a ray meets the plane, or None, as core asks of a Surface."""
-        if direction[2] == 0.0 or not 0.0 <= -origin[2] / direction[2] <= distance:
-            return None
-        gone = -origin[2] / direction[2]
-        return tuple(a + gone * b for a, b in zip(origin, direction, strict=True)), (0.0, 0.0, 1.0)
-
-
 def _rehearse(
     planes: Sequence[core.SamplingPlane], fit: Mapping[str, Any], extent: float, step: float
 ) -> None:
     """Raises ValueError for settings that cannot even rebuild a plane: all touches would be refused."""
-    origin, up = np.zeros(3), (0.0, 0.0, 1.0)
-    core.reconstruct(
-        origin, core.track(_Plane(), origin, up, planes, extent=extent, step=step), outward=up, **fit
-    )
+    up, steps = (0.0, 0.0, 1.0), np.arange(-(extent // step), extent // step + 1)
+    axes = [plane.axes(up) for plane in planes]
+    contours = [core.Contour(np.outer(step * steps, a[:, 0]), plane_normal=a[:, 2]) for a in axes]
+    core.reconstruct(np.zeros(3), contours, outward=up, **fit)

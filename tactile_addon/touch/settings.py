@@ -203,8 +203,8 @@ def touch_arguments(settings: Any) -> dict[str, Any]:
 def draw_chosen(
     layout: bpy.types.UILayout, settings: Any, name: str, found: Mapping[str, str] | None = None
 ) -> None:
-    """Draws a number that the surface chooses if it is 0; its label has the value that was `found`."""
-    if getattr(settings, name):
+    """Draws a setting; the label of a number that the surface chooses has the value that was `found`."""
+    if getattr(settings, name) or name not in AUTO:
         layout.prop(settings, name)
     elif found and found.get(name):
         row = layout.row()

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..probes import probe
 from ..scene import colors, patch_record
-from ..scene.attributes import REASON
+from ..scene.mesh_data import REASON
 from ..scene.viewports import shows_colors
 from ..stability_map import map_object
 from ..touch import units

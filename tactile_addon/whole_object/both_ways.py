@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a surface is off the mesh that was touched, and that mesh off the surface, all over their faces."""
+"""How far a surface is off the mesh that was touched, and back, all over their faces; and why that is."""
 
 import math
 from collections.abc import Callable, Generator, Iterator
-from contextlib import suppress
 from typing import TypeAlias
 
 import numpy as np
@@ -15,15 +14,17 @@ from ...core.steps import part_of
 from ...core.triangles import middles_of_parts, normalized, triangle_cross
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Array, Point
+from ..touch.units import Unit, length
 
-WITHIN = 0.05  # The mesh is looked for along the normal within this share of its size.
 PLACES, SEED = 10_000, 0  # The number of places on the faces of each, and the most vertices, to compare.
 STARTS = 24  # From so many of them the farthest place of all is looked for, as in `_climb`,
 MOVES = 20  # by so many moves, half as long after each that would lead back.
 AT_ONCE, BACK_AT_ONCE = 1000, 300  # The number of places of the surface, or of the mesh, for a step.
-FACES_AT_ONCE = 10_000  # The most faces in a tree, because making a larger one takes too long for a step.
 WAYS = 40  # A place is hidden if rays in this many directions all meet the mesh again.
 LIFT = 1e-4  # They begin this share of the size away from it.
+# The indicator of a surface has at most 200 cells along the object, of which a wall needs three.
+THIN_SHARE = 3.0 / 200.0
+HIDDEN_SHARE = 0.1  # A place is nearly hidden if at most this share of the rays around it meets nothing.
 GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 
 Nearest: TypeAlias = Callable[[Point], tuple[Point, float]]
@@ -48,7 +49,6 @@ class BothWays:
         self.deviation = np.zeros(len(mesh.vertices))
         self.mean, self.within, self.felt = 0.0, 1.0, 1.0
         self.largest, self.place = 0.0, mesh.vertices[0]
-        self._trees: list[BVHTree] = []  # of the surface
         self._apart = 0.0  # How far places are apart, about.
 
     def steps(self) -> Iterator[float]:
@@ -67,11 +67,16 @@ class BothWays:
         there, areas = np.abs(off), np.repeat(np.linalg.norm(across, axis=1), len(shares))
         self._apart = math.sqrt(0.5 * float(areas.sum()) / PLACES)
         yield 0.6
-        yield from self._make_trees()
+        self._tree = BVHTree.FromPolygons(
+            vertices.tolist(), self._mesh.triangles.tolist(), all_triangles=True
+        )
+        yield 0.7
         yield from part_of(self._climb(middles, there, self._to_surface, self._to_mesh), 0.7, 0.8)
-        spread, corner = self._places()
+        target, rng = self._target, np.random.default_rng(SEED)
+        spread, _ = core.scattered(target.points, target.triangles, PLACES, rng)
         felt, back = yield from self._off_surface(spread)
-        yield from self._off_surface(corner)
+        ends = target.points[target.has_face]
+        yield from self._off_surface(ends[:: len(ends) // PLACES + 1])
         yield from part_of(self._climb(felt, back, self._to_mesh, self._to_seen), 0.8, 1.0)
         back = back if len(back) else np.zeros(1)
         self.mean = 0.5 * float(np.average(there, weights=areas) + back.mean())
@@ -82,15 +87,10 @@ class BothWays:
         """Fills in the signed distances (n,) of points (n, 3) of the surface; yields the share done."""
         for start in range(0, len(points), AT_ONCE):
             some = slice(start, start + AT_ONCE)
-            found = self._target.deviations(points[some], normals[some], WITHIN * self._target.size)
-            # Near a crease a ray along the normal may meet a face that is not the nearest. Among those within
-            # the tolerance that matters only for the largest.
-            for i in np.flatnonzero(np.abs(found) > min(self._tolerance, self.largest)).tolist():
-                with suppress(ValueError):  # The nearest face has no area.
-                    nearest = self._target.project(points[start + i].tolist())[2]
-                    found[i] = math.copysign(min(abs(found[i]), nearest), found[i])
-            off[some] = found
-            self._note(points[some], np.abs(found))
+            gaps = points[some] - self._target.feet(points[some])
+            found = np.linalg.norm(gaps, axis=1)
+            off[some] = np.copysign(found, np.sum(gaps * normals[some], axis=1))
+            self._note(points[some], found)
             yield start / len(points)
 
     def _spread(self, off: Array) -> None:
@@ -101,36 +101,19 @@ class BothWays:
         farther = np.abs(around) > np.abs(self.deviation)
         self.deviation[farther] = around[farther]
 
-    def _places(self) -> tuple[Array, Array]:
-        """Places of the mesh, (n, 3) each: such that are spread by area over its faces, and vertices."""
-        target, rng = self._target, np.random.default_rng(SEED)
-        corners = np.flatnonzero(target.has_face)
-        if len(corners) > PLACES:
-            corners = rng.choice(corners, PLACES, replace=False)
-        return core.scattered(target.points, target.triangles, PLACES, rng)[0], target.points[corners]
-
-    def _make_trees(self) -> Iterator[float]:
-        """Makes trees of the surface's faces, some in each; yields the share that is done."""
-        for start in range(0, len(self._mesh.triangles), FACES_AT_ONCE):
-            used, index = np.unique(self._mesh.triangles[start : start + FACES_AT_ONCE], return_inverse=True)
-            corners, faces = self._mesh.vertices[used].tolist(), index.reshape(-1, 3).tolist()
-            self._trees.append(BVHTree.FromPolygons(corners, faces, all_triangles=True))
-            yield 0.7
-
     def _off_surface(self, points: Array) -> Generator[float, None, tuple[Array, Array]]:
         """Those points (n, 3) of the mesh that are not hidden, and how far they are off; yields the share."""
-        seen, found = [np.zeros((0, 3))], [np.zeros(0)]
-        for start in range(0, len(points), BACK_AT_ONCE):
-            some = points[start : start + BACK_AT_ONCE]
-            off = np.array([self._to_surface(point)[1] for point in some.tolist()])
-            yield 0.8
-            far = (off > self._tolerance).tolist()
-            shown = np.array([not (far[i] and self._is_hidden(point)) for i, point in enumerate(some)])
-            seen.append(some[shown])
-            found.append(off[shown])
-            self._note(seen[-1], found[-1])
-            yield 0.8
-        return np.concatenate(seen), np.concatenate(found)
+        seen: list[int] = []
+        found: list[float] = []
+        for number, point in enumerate(points.tolist()):
+            off = self._to_surface(point)[1]
+            if off <= self._tolerance or not self._is_hidden(points[number]):
+                seen.append(number)
+                found.append(off)
+            if number % BACK_AT_ONCE == 0:
+                yield 0.8
+        self._note(points[seen], np.array(found))
+        return points[seen], np.array(found)
 
     def _climb(
         self, places: Array, off: Array, to_same: Nearest, to_other: Nearest
@@ -154,20 +137,13 @@ class BothWays:
 
     def _to_mesh(self, point: Point) -> tuple[Point, float]:
         """The place of the mesh nearest to a point, and its distance."""
-        try:
-            place, _, distance = self._target.project(point)
-        except ValueError:  # The nearest face has no area.
-            return point, 0.0
-        return place, distance
+        (place,) = self._target.feet(np.array([point])).tolist()
+        return place, math.dist(place, point)
 
     def _to_surface(self, point: Point) -> tuple[Point, float]:
         """The place of the surface nearest to a point, and its distance."""
-        place, best = point, math.inf
-        for tree in self._trees:
-            found = tree.find_nearest(point) if best == math.inf else tree.find_nearest(point, best)
-            if found[3] is not None and found[3] < best:
-                place, best = found[0], found[3]
-        return place, best
+        place, _, _, distance = self._tree.find_nearest(point)
+        return place, distance
 
     def _to_seen(self, point: Point) -> tuple[Point, float]:
         """The place of the surface nearest to one of the mesh, and its distance; 0 if that one is hidden."""
@@ -178,15 +154,53 @@ class BothWays:
 
     def _is_hidden(self, point: Array) -> bool:
         """Whether rays from a place of the mesh meet it again in all directions."""
-        size = self._target.size
-        starts = (point + LIFT * size * DIRECTIONS).tolist()
-        rays = zip(starts, DIRECTIONS.tolist(), strict=True)
-        return all(self._target.ray_cast(start, way, 2.0 * size) is not None for start, way in rays)
+        return all(math.isfinite(room(self._target, point, way)) for way in DIRECTIONS)
 
     def _note(self, points: Array, off: Array) -> None:
         """Keeps the largest of the distances (n,) of points (n, 3)."""
         if len(off) and off.max() > self.largest:
             self.largest, self.place = float(off.max()), points[np.argmax(off)]
+
+
+def room(surface: DetachedMesh, place: Array, way: Array) -> float:
+    """How far the next wall is from a place of the mesh along a direction; inf if there is none."""
+    start = (place + LIFT * surface.size * way).tolist()
+    hit = surface.ray_cast(start, way.tolist(), 2.0 * surface.size)
+    return math.inf if hit is None else math.dist(hit[0], place)
+
+
+def why_far(
+    surface: DetachedMesh, place: Array, off: float, patch: core.Reconstruction | None, unit: Unit
+) -> core.Doubt | None:
+    """The doubt about a place (3,) where mesh and surface are `off` apart; None without a cause.
+
+    patch : what was felt nearest to the place, if anything was
+    """
+    foot, normal = (np.array(vector) for vector in surface.project(place.tolist())[:2])
+    narrow = narrowest(surface, foot, normal)
+    words = length(off, unit), length(narrow, unit)
+    if surface.open_edge_distance(place) <= off:
+        code = "open_edges"
+    elif narrow <= THIN_SHARE * surface.size:
+        code = "narrow"
+    elif _free_share(surface, foot, normal) <= HIDDEN_SHARE:
+        code = "hidden"
+    elif patch is not None and surface.is_of_facets(patch):
+        code = "single_facets"
+    else:
+        return None
+    return core.Doubt(code, off, words=words)
+
+
+def narrowest(surface: DetachedMesh, foot: Array, normal: Array) -> float:
+    """How far the next wall is from a place of the mesh, above it or below it."""
+    return min(room(surface, foot, sign * normal) for sign in (-1.0, 1.0))
+
+
+def _free_share(surface: DetachedMesh, foot: Array, normal: Array) -> float:
+    """The share of rays on the outer side of a place of the mesh that meet nothing."""
+    ways = DIRECTIONS[DIRECTIONS @ normal > 0.0]
+    return sum(math.isinf(room(surface, foot, way)) for way in ways) / len(ways)
 
 
 def _directions() -> Array:

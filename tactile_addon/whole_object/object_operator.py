@@ -1,29 +1,30 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Touch All Over: touches that grow over an object by themselves; in slices if there is a window."""
+"""Touch All Over: touches that grow over an object by themselves, and what they are expected to take."""
 
 from collections.abc import Iterator
+from time import perf_counter
 
 import bpy
+import numpy as np
 from bpy.props import EnumProperty, FloatVectorProperty, IntProperty
 
+from ... import core
+from ...core.arguments import many
+from ...core.triangles import triangle_cross
 from ..probes import probe
 from ..probes.in_slices import AllOver, InSlices, Progress
-from ..probes.operators import (
-    has_target,
-    is_in_object_mode,
-    make_active,
-    report_done,
-    target_object,
-)
+from ..probes.operators import make_active, report_done, target_object
 from ..probes.probe_operators import TACTILE_OT_add_subdivision
 from ..scene import patch_record
-from ..touch.settings import NOISE, UNSAVED, draw_chosen, given, length_property
-from ..touch.types import Outcome
-from . import kept, whole_mesh
-from .expected import Expected
-from .object_report import object_summary
-from .object_touches import ObjectTouches
+from ..touch import units
+from ..touch.detached_mesh import DetachedMesh
+from ..touch.settings import NOISE, UNSAVED, given, length_property
+from ..touch.types import Object, Outcome
+from . import whole_mesh
+from .both_ways import THIN_SHARE
+from .object_report import FACETED, object_summary
+from .object_touches import ObjectTouches, tolerance_of
 
 EDGE = length_property(
     "Edge Length",
@@ -35,14 +36,48 @@ ACCURACIES = [
     ("normal", "Normal", "A tolerance of 1/500 of the object's size"),
     ("fine", "Fine", "A tolerance of 1/1250 of the object's size: many touches"),
 ]
+PLACES, SEED = 600, 0  # A few of these random places are touched for the estimate.
+# The time of a touch with its part of joining, and that of a mesh, as multiples of the time of a touch that
+# is tried: python -m benchmarks.add_menu.
+JOINING, MESHING = 3.3, 60.0
+# Edges are a quarter of a wall that is thinner than the size by the first factor or more. Walls that are
+# thinner by the second one have no shorter edges.
+THIN, THINNEST = 16.0, 133.0
+# The ObjectTouches of the last surface by the session_uid of its object; one at most.
+_kept: dict[int, ObjectTouches] = {}
 
 
-class Growing(InSlices):
-    """For operators that touch an object all over, with `_touches`: patches appear, and Esc keeps them."""
+def keep(obj: Object, touches: ObjectTouches) -> None:
+    """Keeps the touches that made an object, so that its mesh can be made again without new touches."""
+    forget()
+    _kept[obj.session_uid] = touches
+
+
+def touches_of(obj: Object | None) -> ObjectTouches | None:
+    """The ObjectTouches that made an object, or None if they are no longer there."""
+    return None if obj is None else _kept.get(obj.session_uid)
+
+
+def forget() -> None:
+    """Forgets the touches that are kept."""
+    _kept.clear()
+
+
+class WithTouches(InSlices):
+    """For operators to inherit that make the surface of a whole object from ObjectTouches, `_touches`."""
+
+    _touches: ObjectTouches
+
+    def _done(self) -> Progress:
+        share = self._touches.share
+        return f"{self._touches.words}: {share:.0%}", share
+
+
+class Growing(WithTouches):
+    """For operators that touch an object all over: patches appear, and Esc keeps them."""
 
     stop = "Stop Touching and Keep"
     stopped = "Stopped: no surface was kept"
-    _touches: ObjectTouches
     _growing: whole_mesh.GrowingPatches | None = None
     _is_ending = False  # Esc was pressed once.
 
@@ -59,10 +94,6 @@ class Growing(InSlices):
             shown = len(self._touches.found)
             yield
 
-    def _done(self) -> Progress:
-        share = self._touches.share
-        return f"{self._touches.words}: {share:.0%}", share
-
     def _check(self, context: bpy.types.Context) -> None:
         self._touches.surface.require_source(context)
 
@@ -71,8 +102,7 @@ class Growing(InSlices):
         if self._is_ending or not self._touches.found:
             return super()._stopped(context)
         self._is_ending, self.stop = True, "Discard the Surface"
-        if not self._touches.is_stopped:  # It may be meshing already.
-            self._touches.stop()
+        self._touches.stop()
         return {"RUNNING_MODAL"}
 
     def _leave(self, context: bpy.types.Context) -> None:
@@ -80,6 +110,64 @@ class Growing(InSlices):
         if self._growing is not None:
             self._growing.remove()
             self._growing = None
+
+
+class Expected:
+    """What is expected of an object, whose mesh is kept until the object changes."""
+
+    def __init__(self) -> None:
+        self._shape: tuple[int, int] | None = None
+        self._mesh: DetachedMesh | None = None
+        self.is_faceted = False  # Whether touches would feel the facets of the object one by one.
+        self.warnings: list[str] = []
+
+    def words(
+        self, target: Object, context: bpy.types.Context, tolerance: float, accuracy: str, noise: float
+    ) -> str:
+        """A sentence on the tolerance, the touches and the seconds of an object that will be touched.
+
+        Raises ValueError, with a sentence, for an object that cannot be touched.
+        """
+        depsgraph = context.evaluated_depsgraph_get()
+        vertices = target.evaluated_get(depsgraph).data.vertices if target.type == "MESH" else ()
+        shape = target.session_uid, len(vertices)
+        if shape != self._shape:
+            self._mesh = DetachedMesh(target, depsgraph)
+            self._shape = shape
+        tolerance = tolerance or tolerance_of(self._mesh.size, accuracy, noise)
+        touches, seconds, share, wall = expected(self._mesh, tolerance, noise)
+        self.is_faceted = share >= FACETED
+        self.warnings = ["Touches will feel its facets one by one"] if self.is_faceted else []
+        if wall < THIN_SHARE:
+            self.warnings.append(f"Walls of {100.0 * wall:.2g} % of its size may be bridged or pierced")
+        about = f"{many(touches, 'touch', 'touches')}, {units.duration(seconds)}"
+        unit = units.unit_of_report(context.scene, {"size": self._mesh.size})  # as the panel has
+        return f"Tolerance {units.length(tolerance, unit)}: about {about}"
+
+
+def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, float, float, float]:
+    """About how many touches a DetachedMesh takes, seconds, its share with few facets, its thinnest wall's.
+
+    Raises ValueError if no touch is possible.
+    """
+    import scipy.interpolate  # noqa: F401  # The import takes half a second, which is not a touch's.
+
+    area = 0.5 * float(np.linalg.norm(triangle_cross(mesh.points[mesh.triangles]), axis=1).sum())
+    places = core.scattered(mesh.points, mesh.triangles, PLACES, np.random.default_rng(SEED))
+    begin = perf_counter()
+    touches, tried, patches = core.expected_touches(
+        mesh, *places, area, tolerance=tolerance, noise=noise, rng=SEED
+    )
+    each = (perf_counter() - begin) / tried
+    areas = np.array([r.domain.area for r in patches])
+    share = float(np.average([mesh.is_of_facets(r) for r in patches], weights=areas))
+    wall = core.thinnest_wall(mesh, *places, mesh.size) / mesh.size
+    return units.rough(touches), (MESHING * fineness(wall) + JOINING * touches) * each, share, wall
+
+
+def fineness(wall: float) -> float:
+    """How many times as many triangles a surface has if its thinnest wall has this share of the size."""
+    return float(np.clip(1.0 / wall, THIN, THINNEST) / THIN) ** 2
 
 
 class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
@@ -118,11 +206,8 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
     )
     edge: EDGE
 
+    shown = ("target", "accuracy", "tolerance", "edge", "most", "noise", "seed")
     _expected = None
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return is_in_object_mode(cls, context, "Objects are touched") and has_target(cls, context)
 
     def _begin(self, context: bpy.types.Context) -> None:
         target, found = target_object(context, self.target), probe.probe_of(context.view_layer.objects.active)
@@ -143,31 +228,21 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
     def _finish(self, context: bpy.types.Context) -> Outcome:
         target = self._touches.surface.require_same(context)
         made = whole_mesh.insert(context.scene, target.name, self._touches.whole, self._touches.report())
-        kept.keep(made, self._touches)
+        keep(made, self._touches)
         make_active(context, made)
         record = made[patch_record.ATLAS_RECORD].to_dict()
         return report_done(self, object_summary(record), record["status"] == "ok")
 
-    def _about(self, context: bpy.types.Context) -> str:
+    def _estimate(self, context: bpy.types.Context, target: Object) -> str:
         """What it will take, in a sentence."""
-        if self._expected is None:
-            self._expected = Expected()
-        target = target_object(context, self.target)
+        self._expected = self._expected or Expected()
         return self._expected.words(target, context, self.tolerance, self.accuracy, self.noise)
 
     def draw(self, context: bpy.types.Context) -> None:
-        self._draw_target(context)
+        super().draw(context)
         layout = self.layout
         for warning in self._expected.warnings if self._expected else ():
             layout.label(text=warning, icon="ERROR")
         if self._expected is not None and self._expected.is_faceted:
             button = layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
             button.target = self.target
-        row = layout.row()
-        row.active = not self.tolerance
-        row.prop(self, "accuracy", expand=True)
-        draw_chosen(layout, self, "tolerance")
-        draw_chosen(layout, self, "edge")
-        layout.prop(self, "most")
-        layout.prop(self, "noise")
-        layout.prop(self, "seed")

@@ -11,7 +11,6 @@ import numpy as np
 
 from ...core.arguments import many
 from ..touch import units
-from ..touch.units import Unit
 from ..touch.wording import vector
 
 # A surface is good if this share of it is within the tolerance of the mesh, and all within so many.
@@ -19,7 +18,7 @@ WITHIN_SHARE, OFF_TOLERANCES = 0.99, 3.0
 FACETED = 0.5  # The panel says that curvatures are those of facets from this share of the area on.
 
 
-def unit_of(record: Mapping[str, Any]) -> Unit:
+def unit_of(record: Mapping[str, Any]) -> units.Unit:
     """The unit of a report in the open scene."""
     return units.unit_of_report(bpy.context.scene, record)
 
@@ -40,11 +39,11 @@ def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("facets", facets(record)),
         ("patches", f"{record['patches']}, of which {record['in_doubt']} alone would be in doubt"),
         ("edges of their graph", record["edges"]),
-        ("tolerance", _tolerance(record)),
+        ("tolerance", _length(record, "tolerance")),
         ("standard deviation of the height", units.say(record["height_std"], 1, unit)),
         ("distance from the mesh", off and f"mean {off}; largest {deviation(record, 'max')}"),
         ("largest distance at", _place(record)),
-        ("surface's mesh", f"{vertices}, {triangles}, edges {_edge(record)}"),
+        ("surface's mesh", f"{vertices}, {triangles}, edges {_length(record, 'edge')}"),
         ("curvatures", _unknown(record)),
     )
 
@@ -115,12 +114,12 @@ def object_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         # It is never "Closed" where touches could go on.
         ("Surface", "Closed" if record["is_closed"] else "Incomplete" if record.get("uncovered") else "Open"),
         ("Felt", within(record["felt"], False) if record.get("uncovered") else None),
-        ("Tolerance", _tolerance(record)),
+        ("Tolerance", _length(record, "tolerance")),
         ("Height", f"± {units.say(record['height_std'], 1, unit_of(record))}"),
         # Where touches could go on, most of it would be the object that was not felt.
         ("Deviation", None if record.get("uncovered") else deviation(record, "mean")),
         ("Patches", record["patches"]),
-        ("Edge Length", _edge(record)),
+        ("Edge Length", _length(record, "edge")),
         ("Vertices", record["vertices"]),
         ("Without Curvature", record.get("unknown_curvatures") or None),
     )
@@ -143,19 +142,15 @@ def _surface(record: Mapping[str, Any]) -> str:
     return "open where the object ends" if record["status"] == "ok" else "open where nothing was felt"
 
 
-def _edge(record: Mapping[str, Any]) -> str | None:
-    return units.say(record["edge"], 1, unit_of(record)) if "edge" in record else None
-
-
 def _unknown(record: Mapping[str, Any]) -> str | None:
     """Where the curvatures are unknown, in words, or None if they are known all over."""
     count = record.get("unknown_curvatures")
     return f"unknown at {many(count, 'vertex', 'vertices')} beside edges and rims" if count else None
 
 
-def _tolerance(record: Mapping[str, Any]) -> str | None:
-    """The tolerance in words, or None if measured contacts have chosen it."""
-    return units.say(record["tolerance"], 1, unit_of(record)) if record["tolerance"] else None
+def _length(record: Mapping[str, Any], key: str) -> str | None:
+    """A length of the report in words, or None if it has none: measured contacts may choose the tolerance."""
+    return units.say(record[key], 1, unit_of(record)) if record.get(key) else None
 
 
 def deviation(record: Mapping[str, Any], what: str) -> str | None:

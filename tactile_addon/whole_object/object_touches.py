@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Touches that grow over an object, step by step, with nothing changed in the scene."""
 
-import math
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
@@ -18,8 +17,7 @@ from ..touch.touch_object import AWAY, nearest_point
 from ..touch.touch_report import verdict_report
 from ..touch.types import Array, Object
 from ..touch.units import Unit, length
-from .both_ways import BothWays
-from .farthest_place import why_far
+from .both_ways import BothWays, narrowest, why_far
 from .object_report import OFF_TOLERANCES, WITHIN_SHARE, unit_of, within
 from .whole_surface import WholeSurface
 
@@ -28,11 +26,8 @@ TOLERANCE_SHARES = {"quick": 1.0 / 200.0, "normal": 1.0 / 500.0, "fine": 1.0 / 1
 LARGEST_TOLERANCE, LARGEST_EDGE = 0.1, 0.5  # With more, neither patches nor triangles would fit.
 STARTS = 20  # The number of places to begin that are tried, besides the one that is given.
 ROOM = 0.05  # Places with this share of the size of room are tried first.
-HAIR = 1e-5  # Rays begin this share of the size away from a place.
 PLACES, SEED = 1000, 0  # The progress is the share of this many places on the mesh that patches cover.
-# Of all that is to be done, touching and joining are done at these shares; of touching and joining again,
-# touching is done at the last one.
-TOUCHED, JOINED, AGAIN = 0.5, 0.8, 0.3
+TOUCHED, JOINED = 0.5, 0.8  # Of all that is to be done, touching and joining are done at these shares.
 
 
 class ObjectTouches:
@@ -42,7 +37,6 @@ class ObjectTouches:
     explored, found : core.Explorations of the touches so far, and their core.Reconstructions
     rims : how far the finger feels each of their patches all round, (AZIMUTHS,), lengths
     done : the number of touches so far, including those that gave no patch
-    uncovered : the number of places that are known to be uncovered
     words, share : what is going on, and the share of all that is done
     whole, compared : the WholeSurface, and its BothWays from the mesh, once the steps are done
     """
@@ -69,9 +63,6 @@ class ObjectTouches:
         import scipy.interpolate  # The import takes half a second, too long between redraws.
         import scipy.ndimage  # noqa: F401
 
-        for name, value in (("tolerance", tolerance), ("noise", noise), ("edge", edge)):
-            if not value >= 0.0:  # NaN fails every comparison, so it is refused, too.
-                raise ValueError(f"The {name} is a length of 0 or more, got {length(value)}")
         self.surface = DetachedMesh(obj, depsgraph)
         self.tolerance = tolerance or tolerance_of(self.surface.size, accuracy, noise)
         self._require_lengths(noise, edge)
@@ -89,30 +80,32 @@ class ObjectTouches:
         self.explored: list[core.Exploration] = []
         self.found: list[core.Reconstruction] = []
         self.rims: list[Array] = []
-        self.done, self.uncovered = 0, 0
+        self.done = 0
         self.words, self.share = "Looking for a place to begin", 0.0
         self.is_stopped = False
-        self._left = self._spread()
-        self._rounds, self._joined, self._is_joining = 0, 0, False  # The joinings, and the touches before.
+        # How often it has begun to join or to touch again, and the number of touches before.
+        self._phases, self._before, self._is_joining = 0, 0, False
         self._area = self._faceted = 0.0
 
     def _require_lengths(self, noise: float, edge: float) -> None:
         """Raises ValueError, with a sentence, for lengths that are too large or too small for this object."""
         name, size, tolerance = self.surface.name, self.surface.size, self.tolerance
-        if tolerance < noise:
-            raise ValueError(
-                f"The tolerance {length(tolerance)} is below the noise {length(noise)}: use a larger one"
-            )
         for what, value, most in (
             ("noise", noise, LARGEST_TOLERANCE),
             ("tolerance", tolerance, LARGEST_TOLERANCE),
             ("edge length", edge, LARGEST_EDGE),
         ):
+            if not value >= 0.0:  # NaN fails every comparison, so it is refused, too.
+                raise ValueError(f"The {what} is a length of 0 or more, got {length(value)}")
             if value > most * size:
                 raise ValueError(
                     f'The {what} {length(value)} is larger than {length(most * size)}, {most:g} of "{name}": '
                     "use a smaller one"
                 )
+        if tolerance < noise:
+            raise ValueError(
+                f"The tolerance {length(tolerance)} is below the noise {length(noise)}: use a larger one"
+            )
         if tolerance < self.surface.spacing:
             raise ValueError(
                 f'The tolerance {length(tolerance)} is finer than the coordinates of "{name}", which are '
@@ -128,6 +121,8 @@ class ObjectTouches:
     def steps(self) -> Iterator[None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
         steps, state = self._started()
+        rng = np.random.default_rng(SEED)
+        self._left = core.scattered(self.surface.points, self.surface.triangles, PLACES, rng)[0]
         while True:
             self._note(state)
             yield
@@ -165,23 +160,8 @@ class ObjectTouches:
         for middle in self.surface.points[faces].mean(axis=1):  # It is off all edges.
             with suppress(ValueError):  # The face has no area.
                 found.append(self.surface.project(middle)[:2])
-        return sorted(found, key=lambda place: -min(self._room(*place), ROOM * self.surface.size))
-
-    def _room(self, point: Any, outward: Any) -> float:
-        """How far a place is from the next wall before it, or below it if that is nearer."""
-        size, rooms = self.surface.size, []
-        for way in (np.array(outward), -np.array(outward)):
-            start = point + HAIR * size * way
-            hit = self.surface.ray_cast(start.tolist(), way.tolist(), size)
-            rooms.append(size if hit is None else math.dist(hit[0], start))
-        return min(rooms)
-
-    def _spread(self) -> Array:
-        """Places all over the mesh, (PLACES, 3), of which patches will cover more and more."""
-        with suppress(ValueError):  # No face has an area, so touches cannot begin.
-            rng = np.random.default_rng(SEED)
-            return core.scattered(self.surface.points, self.surface.triangles, PLACES, rng)[0]
-        return np.zeros((0, 3))
+        most = ROOM * self.surface.size
+        return sorted(found, key=lambda place: -min(narrowest(self.surface, *map(np.array, place)), most))
 
     def _note(self, state: core.Progress) -> None:
         for exploration, rim in zip(state.found, state.rims, strict=True):
@@ -192,31 +172,28 @@ class ObjectTouches:
             self._area += r.domain.area
             self._faceted += r.domain.area * self.surface.is_of_facets(r)
             self._left = self._left[~core.covered_by(r, rim, self._left, self.tolerance)]
-        self.done, self.uncovered = self._in_vain + state.done, state.uncovered
+        self.done = self._in_vain + state.done
         touches, places = many(self.done, "touch", "touches"), many(state.uncovered, "place", "places")
         patches = many(len(self.found), "patch", "patches")
-        if state.joining is None:
-            self._is_joining = False
-            # The last touches may still end when it is stopped.
-            goes_on = f"{touches}, {places} left" if state.uncovered else touches
-            self.words = f"Joining {patches}" if self.is_stopped else goes_on
+        is_joining = state.joining is not None
+        if is_joining is not self._is_joining:
+            self._phases, self._before, self._is_joining = self._phases + 1, state.done, is_joining
+        if state.joining == 1.0:
+            self.words = f"Checking the surface of {patches}"
+        elif is_joining or self.is_stopped:  # The last touches may still end when it is stopped.
+            self.words = f"Joining {patches}"
         else:
-            self._rounds += not self._is_joining
-            self._is_joining, self._joined = True, state.done
-            self.words = f"Joining {patches}" if state.joining < 1.0 else f"Checking the surface of {patches}"
+            self.words = f"{touches}, {places} left" if state.uncovered else touches
         self.share = max(self.share, self._share(state))
 
     def _share(self, state: core.Progress) -> float:
         """About which share of all is done in a state of the touches."""
         felt = 1.0 - len(self._left) / PLACES
-        if not self._rounds:
+        if not self._phases:
             return TOUCHED * felt
-        # How often it touches and joins again is not known before. Each round has half of what is left.
-        if state.joining is None:
-            done, begun = AGAIN * (1.0 - self._joined / state.done), self._rounds + 1
-        else:
-            done, begun = AGAIN + (1.0 - AGAIN) * state.joining, self._rounds
-        return felt * (TOUCHED + (JOINED - TOUCHED) * (1.0 - (2.0 - done) * 0.5**begun))
+        # How often it touches and joins again is not known before. Each phase has half of what is left.
+        done = 1.0 - self._before / state.done if state.joining is None else state.joining
+        return felt * (TOUCHED + (JOINED - TOUCHED) * (1.0 - (2.0 - done) * 0.5**self._phases))
 
     def meshing(self, start: float = 0.0) -> Iterator[None]:
         """Makes the mesh and compares it in steps, from the share `start` of all on."""

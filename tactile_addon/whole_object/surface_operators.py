@@ -9,17 +9,15 @@ import numpy as np
 from bpy.props import IntProperty
 from mathutils import Vector
 
-from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import is_in_object_mode, make_active, polls, report_done, report_error, surface_of
 from ..scene import patch_record
-from ..scene.attributes import DEVIATION
-from ..scene.mesh_data import own_mesh, values
+from ..scene.mesh_data import DEVIATION, own_mesh, values
 from ..touch import units
 from ..touch.arrays import read_array
-from ..touch.settings import draw_chosen, length_property
+from ..touch.settings import length_property
 from ..touch.types import Object, Outcome, Point
-from . import kept, whole_mesh
-from .object_operator import EDGE, Growing
+from . import whole_mesh
+from .object_operator import EDGE, Growing, WithTouches, keep, touches_of
 from .object_report import deviation, object_summary, unit_of
 from .object_touches import ObjectTouches
 
@@ -79,18 +77,13 @@ def _select_nearest(mesh: bpy.types.Mesh, place: Point) -> Any:
     return mesh.vertices[nearest]
 
 
-class OnSurface(InSlices):
-    """For operators that make the active surface of a whole object anew, from the touches that are kept.
-
-    _touches : the ObjectTouches, once it has begun
-    """
-
-    _touches: ObjectTouches
+class OnSurface(WithTouches):
+    """For operators that make the active surface of a whole object anew, from the touches that are kept."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         hint = "Only the last surface that was touched has its touches in memory"
-        has_touches = polls(cls, kept.touches_of(surface_of(context)), hint)
+        has_touches = polls(cls, touches_of(surface_of(context)), hint)
         return has_touches and is_in_object_mode(cls, context, "Surfaces are made")
 
     def _kept(self, context: bpy.types.Context) -> ObjectTouches:
@@ -98,7 +91,7 @@ class OnSurface(InSlices):
         obj = surface_of(context)
         patch_record.require_colored(obj)
         self._uid, self._name = obj.session_uid, obj.name
-        return kept.touches_of(obj)
+        return touches_of(obj)
 
     def _object(self, context: bpy.types.Context) -> Object:
         """The object of the surface. Raises ValueError, with a sentence, if it is gone or may be edited."""
@@ -114,7 +107,7 @@ class OnSurface(InSlices):
         obj = self._object(context)
         report = self._touches.report() | {"source": obj[patch_record.ATLAS_RECORD]["source"]}
         whole_mesh.rewrite(obj, self._touches.whole, report)
-        kept.keep(obj, self._touches)
+        keep(obj, self._touches)
         record: dict[str, Any] = obj[patch_record.ATLAS_RECORD].to_dict()
         return record
 
@@ -129,6 +122,7 @@ class TACTILE_OT_mesh_again(OnSurface, bpy.types.Operator):
     edge: EDGE
 
     stop = "Keep It as It Was"
+    shown = ("edge",)
     stopped = "Stopped: the surface stays as it was"
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
@@ -141,21 +135,12 @@ class TACTILE_OT_mesh_again(OnSurface, bpy.types.Operator):
     def _check(self, context: bpy.types.Context) -> None:
         self._object(context)
 
-    def _done(self) -> Progress:
-        share = self._touches.share
-        return f"{self._touches.words}: {share:.0%}", share
-
     def _finish(self, context: bpy.types.Context) -> Outcome:
         record = self._rewrite(context)
         summary = object_summary(record)
         if self.edge > self._touches.whole.atlas.longest_edge():
             summary += f"; edges are {units.length(record['edge'], unit_of(record))} long, as thin walls need"
         return report_done(self, summary)
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split, layout.use_property_decorate = True, False
-        draw_chosen(layout, self, "edge")
 
 
 class TACTILE_OT_continue_touching(Growing, OnSurface, bpy.types.Operator):
@@ -176,6 +161,7 @@ class TACTILE_OT_continue_touching(Growing, OnSurface, bpy.types.Operator):
         soft_max=10_000,
     )
 
+    shown = ("tolerance", "more")
     stopped = "Stopped: the surface stays as it was"
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
@@ -191,12 +177,6 @@ class TACTILE_OT_continue_touching(Growing, OnSurface, bpy.types.Operator):
         self._touches.surface.require_same(context)
         record = self._rewrite(context)
         return report_done(self, object_summary(record), record["status"] == "ok")
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split, layout.use_property_decorate = True, False
-        draw_chosen(layout, self, "tolerance")
-        layout.prop(self, "more")
 
 
 CLASSES = (TACTILE_OT_look_farthest, TACTILE_OT_mesh_again, TACTILE_OT_continue_touching)

@@ -4,7 +4,6 @@
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
 import bpy
@@ -13,8 +12,18 @@ from mathutils import Matrix
 
 from ... import core
 from ..scene import colors, patch_object, patch_record, undo
-from ..scene.attributes import COLOR, CORNERS, DEVIATION, HEIGHT_STD, NODE
-from ..scene.mesh_data import ABOVE, emission, fill, own_mesh, write
+from ..scene.mesh_data import (
+    ABOVE,
+    COLOR,
+    CORNERS,
+    DEVIATION,
+    HEIGHT_STD,
+    NODE,
+    emission,
+    fill,
+    own_mesh,
+    write,
+)
 from ..scene.shown import bend_range, recolor
 from ..scene.viewports import show_colors, show_size
 from ..touch.detached_mesh import DetachedMesh
@@ -22,14 +31,15 @@ from ..touch.types import Array, Object
 from .whole_surface import WholeSurface
 
 SHARP = math.radians(30.0)  # Edges at which faces are turned by more are creases.
-# While a patch is one of many, it is drawn with these rings, the last of which is its dark rim, and spokes.
+# While a patch is one of many, it is drawn with these rings around its middle, the last of which is its dark
+# rim, and spokes.
 RINGS, SPOKES = (0.25, 0.5, 0.75, 0.95, 1.0), 48
-RIM_COLOR = (0.02, 0.02, 0.02, 1.0)
-# It is drawn no lower than the mesh, above that by this share of the object's size, or of its own if that is
-# less, and above patches that it overlaps by as much, up to so many times.
-LAYER, OWN_LAYER, LAYERS = 6e-4, 2e-2, 6
-# Patches overlap only if the cosine between their normals is more; that of two walls of a block is 0.
-ALIKE = 0.1
+RIM_COLOR = (0.15, 0.15, 0.15, 1.0)
+# It is drawn no lower than the mesh, and above that by one to four times this share of the object's size, or
+# of its own if that is less: overlapping patches at one height would flicker, and multiples of the golden
+# section are far apart from those before them.
+LAYER, OWN_LAYER, LAYERS = 6e-4, 2e-2, 3
+GOLDEN_SECTION = 0.5 * (math.sqrt(5.0) - 1.0)
 DRAWN_ABOVE = 5e-3  # That of the whole surface where it is not drawn in front, as a share of its size.
 
 
@@ -45,11 +55,10 @@ class GrowingPatches:
         scene.collection.objects.link(obj)  # A collection of its own might be left empty.
         with undo.after_step():  # There is an undo step when the operator ends.
             undo.note_added(obj)
-        obj.data.materials.append(emission("Tactile Surface", attribute=COLOR))
+        obj.data.materials.append(emission("Tactile Surface", COLOR))
         self._patches: list[tuple[Array, Array]] = []
         self._bends: list[tuple[float, float]] = []  # The larger principal curvature of each, and its area.
         self._uid, self._size, self._surface = obj.session_uid, surface.size, surface
-        self._placed = np.zeros((0, 8))  # The origin, normal, reach and height of each patch.
         show_colors()
         show_size(surface.size)
 
@@ -61,7 +70,8 @@ class GrowingPatches:
         for r, rim in zip(found, rims, strict=True):
             points, normals, mean_curvature = _disk(r, rim)
             layer = min(LAYER * self._size, OWN_LAYER * float(np.median(rim)))
-            above = _below(self._surface, points, normals) + self._height(r.frame, rim.max(), layer)
+            layer *= 1.0 + LAYERS * (GOLDEN_SECTION * len(self._patches) % 1.0)
+            above = _below(self._surface, points, normals) + layer
             self._patches.append((points + above[:, None] * normals, mean_curvature))
             certain = max(abs(r.k1) - r.k1_std, abs(r.k2) - r.k2_std, 0.0)
             self._bends.append((certain, np.mean(rim**2)))
@@ -69,20 +79,9 @@ class GrowingPatches:
         count = 1 + SPOKES * len(RINGS)
         triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
         bends, areas = np.transpose(self._bends)
-        shades = colors.diverging(mean_curvatures, bend_range(bends, areas, self._size))
+        shades = colors.shades(mean_curvatures, bend_range(bends, areas, self._size))
         shades.reshape(-1, count, 4)[:, -SPOKES:] = RIM_COLOR
         fill(obj.data, points, triangles, [(COLOR, shades)])
-
-    def _height(self, frame: core.Frame, reach: float, layer: float) -> float:
-        """The lowest free multiple of a length for a patch, as overlapping ones at one height flicker."""
-        normal, (others, ups) = frame.axes[:, 2], np.hsplit(self._placed[:, :6], 2)
-        near = np.linalg.norm(others - frame.origin, axis=1) < self._placed[:, 6] + reach
-        taken = self._placed[near & (ups @ normal > ALIKE), 7]
-        heights = layer * np.arange(1, LAYERS + 1)
-        is_free = np.abs(heights[:, None] - taken).min(axis=1, initial=np.inf) > 0.4 * layer
-        height = float(heights[np.argmax(is_free) if is_free.any() else len(taken) % LAYERS])
-        self._placed = np.vstack([self._placed, [*frame.origin, *normal, reach, height]])
-        return height
 
     def remove(self) -> None:
         """Deletes the object, if it is still there."""
@@ -122,15 +121,11 @@ def _below(surface: DetachedMesh, points: Array, normals: Array) -> Array:
 
 def _fan() -> Array:
     """The triangles (m, 3) between the points of a disk."""
-    a, b = np.arange(SPOKES), np.roll(np.arange(SPOKES), -1)
-    rings = [(1 + SPOKES * i + a, 1 + SPOKES * i + b) for i in range(len(RINGS))]
-    parts = [np.column_stack([np.zeros_like(a), *rings[0]])]
-    for (inner, inner_next), (outer, outer_next) in pairwise(rings):
-        parts += [
-            np.column_stack([inner, outer, outer_next]),
-            np.column_stack([inner, outer_next, inner_next]),
-        ]
-    return np.vstack(parts)
+    inner = np.arange(SPOKES * len(RINGS)).reshape(-1, SPOKES)
+    a, b = inner.ravel(), np.roll(inner, -1, axis=1).ravel()
+    halves = [np.column_stack([a, a + SPOKES, b + SPOKES]), np.column_stack([a, b + SPOKES, b])]
+    triangles = np.maximum(np.vstack(halves) - SPOKES + 1, 0)  # The innermost ring is one point.
+    return triangles[triangles[:, 0] != triangles[:, 2]]
 
 
 def insert(scene: bpy.types.Scene, name: str, whole: WholeSurface, report: dict[str, Any]) -> Object:
@@ -139,7 +134,7 @@ def insert(scene: bpy.types.Scene, name: str, whole: WholeSurface, report: dict[
     obj = bpy.data.objects.new(mesh.name, mesh)
     obj.matrix_world = Matrix.Translation(list(whole.origin))
     patch_object.collection(scene).objects.link(obj)
-    mesh.materials.append(emission("Tactile Surface", attribute=COLOR))
+    mesh.materials.append(emission("Tactile Surface", COLOR))
     rewrite(obj, whole, report | {"source": name})
     show_colors()
     return obj

@@ -87,23 +87,12 @@ class WholeSurface:
     def doubts(self) -> list[core.Doubt]:
         """The doubts of the atlas, or that its surface has holes only as it is shown."""
         doubts = list(self.atlas.doubts)
-        if not doubts and _rims(self.mesh) > _rims(self.atlas.reference.mesh):
+        if not doubts and self.mesh.rims > self.atlas.reference.mesh.rims:
             doubts.append(core.Doubt("holes"))
         return doubts
 
 
 def _edge(mesh: core.Mesh) -> float:
-    """The typical length of a mesh's edges."""
+    """The median length of all sides of a mesh's triangles; Mesh.edge takes one of each, which may differ."""
     ends = mesh.vertices[mesh.triangles]
     return float(np.median(np.linalg.norm(ends - np.roll(ends, 1, axis=1), axis=2)))
-
-
-def _rims(mesh: core.Mesh) -> int:
-    """The number of rims of a mesh: where its object ends, and around holes."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    ends, index = np.unique(mesh.border, return_inverse=True)
-    a, b = index.reshape(-1, 2).T
-    links = coo_matrix((np.ones(len(a)), (a, b)), (len(ends),) * 2)
-    return connected_components(links)[0] if len(ends) else 0

@@ -315,7 +315,7 @@ def test_a_mesh_file_with_numbers_that_blender_reads_as_0_is_refused(command, em
     code, _, err = command("map", tmp_path / kind)
     assert code == 1
     assert err.startswith(
-        f'tactile: "{kind}" has vertices whose coordinates are not finite in single precision, 1'
+        f'tactile: "{kind}" has vertices whose coordinates are not finite in single precision: '
     )
 
 
@@ -324,13 +324,13 @@ def test_a_word_in_place_of_a_number_is_refused_too(command, empty, tmp_path, wo
     (tmp_path / "mesh.obj").write_bytes(mesh_data("mesh.obj", word))
     code, _, err = command("map", tmp_path / "mesh.obj")
     assert code == 1
-    assert "1 of them: correct or delete these" in err
+    assert "correct or delete these" in err
 
 
 def test_numbers_that_blender_reads_as_0_are_found_wherever_vertices_are(command, empty, tmp_path):
     indented = mesh_data("mesh.obj", "nan").replace(b"v ", b"  v ")
     (tmp_path / "mesh.obj").write_bytes(indented)
-    assert "1 of them: correct or delete these" in command("map", tmp_path / "mesh.obj")[2]
+    assert "correct or delete these" in command("map", tmp_path / "mesh.obj")[2]
     head, rows = mesh_data("text.ply", "nan").decode().split("end_header\n")
     vertices, faces = head.index("element vertex"), head.index("element face")
     lines = rows.splitlines()
@@ -340,7 +340,7 @@ def test_numbers_that_blender_reads_as_0_are_found_wherever_vertices_are(command
         + head[vertices:faces]
         + "\n".join(["end_header", *lines[-len(FACES) :], *lines[: -len(FACES)], ""])
     )
-    assert "1 of them: correct or delete these" in command("map", tmp_path / "text.ply")[2]
+    assert "correct or delete these" in command("map", tmp_path / "text.ply")[2]
 
 
 def rearranged(kind, change, word="nan"):
@@ -390,7 +390,7 @@ def test_numbers_that_blender_reads_as_0_are_found_below_any_header(command, emp
     path.write_bytes(rearranged(kind, change, "0.1"))
     assert "not finite" not in command("map", path)[2]
     path.write_bytes(rearranged(kind, change))
-    assert "1 of them: correct or delete these" in command("map", path)[2]
+    assert "correct or delete these" in command("map", path)[2]
 
 
 def long_line(head, rows):

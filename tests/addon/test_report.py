@@ -198,8 +198,8 @@ def test_the_page_of_a_map_counts_touches_by_their_area_and_no_vertices(empty, e
     empty.ops.tactile.stability_map(target="Cylinder", spacing=0.5)
     painted = empty.context.object
     record = painted["tactile_map"].to_dict()
-    page = Page(extension.tactile_addon.report.map_page.map_page(painted))
-    rows = dict(extension.tactile_addon.stability_map.map_report.map_table_rows(record))
+    page = Page(extension.tactile_addon.report.pages.map_page(painted))
+    rows = dict(extension.tactile_addon.stability_map.map_object.map_table_rows(record))
     (row,) = [row for row in page.rows if row[0] == "± 1 standard deviation"]
     assert row[1] == rows["median standard deviation"]
 

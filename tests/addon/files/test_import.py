@@ -464,12 +464,13 @@ def test_simulated_contacts_from_the_shell_are_a_data_set(command, files):
         assert again[key] == pytest.approx(report[key], rel=0.02)
 
 
-def test_contacts_beyond_memory_are_a_sentence(empty, extension, tmp_path, monkeypatch):
+@pytest.mark.parametrize("place", ["common_point", "contacts_from_csv"])
+def test_contacts_beyond_memory_are_a_sentence(empty, extension, tmp_path, monkeypatch, place):
     def exhausted(*_, **__):
         raise MemoryError
 
     (tmp_path / "contacts.csv").write_text("x,y,z\n0,0,0\n")
-    monkeypatch.setattr(extension.tactile_addon.files.measured.core, "common_point", exhausted)
+    monkeypatch.setattr(extension.tactile_addon.files.measured.core, place, exhausted)
     before = datablocks(empty)
     with pytest.raises(RuntimeError, match="There are more contacts than fit into memory: use fewer of them"):
         empty.ops.tactile.import_contacts(filepath=str(tmp_path / "contacts.csv"))

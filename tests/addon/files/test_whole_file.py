@@ -119,20 +119,6 @@ def test_an_interrupted_write_leaves_nothing_but_the_old_file(whole_file, tmp_pa
     assert (tmp_path / "a.txt").read_text() == OLD
 
 
-def test_what_a_killed_process_left_is_swept_by_the_next_write(whole_file, tmp_path):
-    """A process that is at work writes to its file now and then, so that stays."""
-    with pytest.raises(OSError, match=r"cannot write"), whole_file.replacing(tmp_path / "a.txt") as temporary:
-        left = temporary.with_name(temporary.name.replace("a-", "a-0"))
-    busy = left.with_name(left.name.replace("a-0", "a-1"))
-    mine = tmp_path / ".a-20260101.txt"
-    for path in (left, busy, mine):
-        path.write_text("half of")
-    for path in (left, mine):
-        os.utime(path, (0.0, 0.0))
-    whole_file.write_text(tmp_path / "a.txt", "whole")
-    assert sorted(os.listdir(tmp_path)) == sorted(["a.txt", busy.name, mine.name])
-
-
 def test_a_link_stays_a_link_to_the_new_file(whole_file, tmp_path):
     (tmp_path / "a.txt").write_text(OLD)
     (tmp_path / "link.txt").symlink_to("a.txt")

@@ -274,7 +274,7 @@ def test_a_single_thing_is_not_said_in_the_plural(extension, empty):
     found = {"target": "Cube", "vertices": 1, "overlap": 1.0, "extra_points": 9}
     found |= {"vertex_distance_mean": 0.5, "vertex_distance_max": 0.5}
     report = {"status": "ok", "radius": 1.0, "verification": found}
-    wording = addon.comparison.verification_wording
+    wording = addon.comparison.verify_operator
     words = wording.verification_summary(report)[1]
     assert words.startswith('At 1 vertex, "Cube" is 0.5 m off the patch on average')
     found["vertices"] = 2
@@ -282,7 +282,7 @@ def test_a_single_thing_is_not_said_in_the_plural(extension, empty):
     measured = {"status": "ok", "is_closed": True, "patches": 1, "contacts": 1, "height_std": 0.1}
     measured |= {"tolerance": None, "radius": 1.0}
     assert "1 patch of 1 contact;" in addon.whole_object.object_report.object_summary(measured)
-    made = addon.stability_map.map_report.map_table_rows(
+    made = addon.stability_map.map_object.map_table_rows(
         {
             "source": "Cube",
             "touched": 1,

@@ -166,7 +166,7 @@ def test_an_automatic_extent_fits_the_place(empty, ridge):
 def test_a_map_with_an_automatic_extent_says_so(empty, ridge, extension):
     painted, record = stability_map(empty, target=ridge.name, spacing=0.5)
     stability_map_room = extension.tactile_addon.stability_map
-    rows = dict(stability_map_room.map_report.map_table_rows(record))
+    rows = dict(stability_map_room.map_object.map_table_rows(record))
     assert rows["spacing, extent, step"] == "0.5 m, auto, auto"
     assert stability_map_room.map_object.inputs_of(painted)["extent"] == 0.0  # a probe on the map gets this
 
@@ -582,7 +582,7 @@ def test_large_faces_are_touched_as_densely_as_the_spacing_says(empty, touched, 
 def test_a_map_of_a_plane_is_without_error(empty, extension):
     empty.ops.mesh.primitive_plane_add()
     _, record = stability_map(empty, spacing=0.5)
-    report = extension.tactile_addon.stability_map.map_report
+    report = extension.tactile_addon.stability_map.map_object
     count = record["points"]
     assert report.map_summary(record) == f"{count} patches at {count} points, 0 in doubt"
     assert dict(report.map_table_rows(record))["median error"] == "0 m"
@@ -592,7 +592,7 @@ def test_a_map_of_few_facets_is_in_doubt_and_says_why(empty, extension):
     empty.ops.mesh.primitive_torus_add()
     _, record = stability_map(empty, spacing=0.5)
     assert record["in_doubt"] == record["few_facets"] == record["patches"] > 5
-    words = extension.tactile_addon.stability_map.map_report.facets(record)
+    words = extension.tactile_addon.stability_map.map_object.facets(record)
     assert words == f"Curvature of the facets, not of the shape, at {record['patches']} points"
-    rows = dict(extension.tactile_addon.stability_map.map_report.map_rows(record, ("m", 1.0)))
+    rows = dict(extension.tactile_addon.stability_map.map_object.map_rows(record, ("m", 1.0)))
     assert rows["… on Facets"] == str(record["few_facets"])

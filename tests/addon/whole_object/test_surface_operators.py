@@ -183,7 +183,7 @@ def test_quick_and_fine_have_other_tolerances(empty, ball):
 
 @pytest.mark.long
 def test_a_dialog_can_tell_how_many_touches_there_will_be(extension, empty, ball):
-    expected = extension.tactile_addon.whole_object.expected.Expected()
+    expected = extension.tactile_addon.whole_object.object_operator.Expected()
     words = expected.words(ball, empty.context, 0.02, "normal", 0.0)
     assert words.startswith("Tolerance 0.02 m: about ") and " touches, " in words
     count = int(words.split()[4])
@@ -193,7 +193,7 @@ def test_a_dialog_can_tell_how_many_touches_there_will_be(extension, empty, ball
 
 
 def test_a_dialog_can_tell_that_facets_will_be_felt(extension, empty):
-    expected = extension.tactile_addon.whole_object.expected.Expected()
+    expected = extension.tactile_addon.whole_object.object_operator.Expected()
     empty.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
     obj = empty.context.object
     for is_faceted in (True, False):
@@ -204,7 +204,7 @@ def test_a_dialog_can_tell_that_facets_will_be_felt(extension, empty):
 
 
 def test_a_dialog_can_tell_that_walls_are_thin(extension, empty):
-    expected = extension.tactile_addon.whole_object.expected.Expected()
+    expected = extension.tactile_addon.whole_object.object_operator.Expected()
     empty.ops.mesh.primitive_cube_add(size=1.0)
     empty.context.object.scale.z = 0.01
     empty.context.view_layer.update()
@@ -214,7 +214,7 @@ def test_a_dialog_can_tell_that_walls_are_thin(extension, empty):
 
 def test_the_mesh_of_thin_walls_is_fine(extension):
     """Each halving of a wall halves edges, until the grid is as fine as it may be."""
-    fineness = extension.tactile_addon.whole_object.expected.fineness
+    fineness = extension.tactile_addon.whole_object.object_operator.fineness
     assert fineness(np.inf) == fineness(1.0) == fineness(1.0 / 16.0) == 1.0
     assert fineness(1.0 / 32.0) == pytest.approx(4.0)
     assert fineness(1.0 / 64.0) == pytest.approx(16.0)
