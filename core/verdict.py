@@ -154,6 +154,10 @@ REASONS = {
         "where strokes are farther apart than half of the wall or gap",
         ("make strokes nearer to each other", "measure normals"),
     ),
+    "sparse": Reason(
+        "Contacts around {0} are so far apart that the surface between them may be off by {value:.2g}",
+        ("feel more there",),
+    ),
     "unfelt": Reason("Nothing was felt beyond {0} where the object may go on", ("touch there",)),
     # A whole object that was touched.
     "stopped": Reason(
@@ -257,10 +261,12 @@ class Doubt:
         }
 
 
-def beyond(code: str, value: float, limit: float, useless: tuple[str, ...] = ()) -> Iterator[Doubt]:
+def beyond(
+    code: str, value: float, limit: float, useless: tuple[str, ...] = (), words: tuple[str, ...] = ()
+) -> Iterator[Doubt]:
     """The doubt of this code, if the value is beyond the limit."""
     if value > limit:
-        yield Doubt(code, value, limit, useless=useless)
+        yield Doubt(code, value, limit, words, useless)
 
 
 def joined(advice: Sequence[str]) -> str:

@@ -23,7 +23,7 @@ from ..triangles import row_dot
 from ..verdict import Doubt, beyond
 from .charts import AZIMUTHS, Charts
 from .connectivity import Indices, connected_pieces
-from .field import AGREE
+from .field import AGREE, covered
 from .finger import FACING
 from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
@@ -35,14 +35,12 @@ from .unfelt import place_at, uncovered_places
 FEWEST = 40  # The smallest patch has this many contacts.
 SOME_PLACES = 24  # The number of places at which it is tried how large a patch has to be.
 WIDENING, WIDENINGS = 1.4, 10  # Patches grow by this factor, at most this often.
-# Patches are at least the first share of their radius from each other, but for contacts that are farther out
-# than the third, up to which a patch reaches. Contacts within the second share of the least radius of one
-# without a patch carry none either: otherwise a patch bulges to a single contact that is off (test_measured).
-PATCHES_APART, MISSING, COVERED = 0.6, 0.6, 1.0
+# A contact carries no patch if one is nearer than the first share of its radius, and reaches it: up to the
+PATCHES_APART, COVERED = 0.6, 1.0  # second share of the radius of its domain.
 # A patch goes on to an edge where a contact is within this share of its neighbors' reach: with 0.3 an L whose
 # contacts end half a spacing before its edges is in doubt (test_measured), with 0.5 a pear of 400 even
 AT_EDGE = 0.45  # contacts has a spike of a twentieth of its size.
-RAY_PLACES = 24  # Where a patch ends is looked for at this many places on each ray.
+RAY_PLACES, RAY_ROUNDS = 16, 2  # Where a patch ends is looked for at so many places on each ray, so often.
 ABREAST = 8  # The number of neighbors of each contact that are to face the same way.
 SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
 OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
@@ -51,6 +49,8 @@ OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one
 TURNED = 0.25
 GROWN = 0.012  # Without a tolerance, patches grow up to this mean deviation, as a share of the radius.
 COARSEST = 0.1  # The tolerance is at most this share of the size: larger patches do not show the object.
+# Contacts and surface are off each other by at most this share of the size. Without, 5 of 10 "ok" on evenly
+MOST_OFF = 0.02  # spread contacts are off by up to 4 % of the size (python -m benchmarks.measured --even).
 
 
 def atlas_of(
@@ -98,22 +98,38 @@ def cover_contacts(
     radius, noise = yield from cloud.least_radius_and_noise(radius)
     found, charts = yield from _patches(cloud._replace(noise=noise), radius)
     reference = yield from part_of(joined_surface(found, charts, largest, contacts.off), 1.0, 1.0)
-    atlas = Atlas(
-        tuple(found), charts, reference, largest, uncovered_places(reference, charts), contacts=contacts
-    )
-    most = largest or GROWN * radius
+    uncovered = uncovered_places(reference, charts)
+    atlas = Atlas(tuple(found), charts, reference, largest, uncovered, contacts=contacts)
+    return (yield from _judged(atlas, contacts, doubts, cloud.noise, noise, radius))
+
+
+def _judged(
+    atlas: Atlas, contacts: MeasuredContacts, doubts: list[Doubt], given: float, noise: float, radius: float
+) -> Generator[float, None, Atlas]:
+    """The atlas with its doubts: these, and those of how contacts and surface are off each other; yields 1.
+
+    given, noise : the noise that was given or 0, and that of the fit
+    radius : the least of a patch
+    """
+    from scipy.spatial import cKDTree
+
+    mesh, most = atlas.reference.mesh, atlas.tolerance or GROWN * radius
     off_surface = partial(_off_surface, atlas, noise, most)
     distances, far, is_turned = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
-    worst = _largest_cluster(far, distances, contacts.links)
-    off = _doubts_of_contacts(contacts, distances, far, worst, is_turned)
-    doubts += [*_doubts_of_surface(atlas, 0.0 if cloud.noise else noise, most), *off]
+    off_planes = partial(_off_planes, atlas.charts, cKDTree(contacts.points), contacts)
+    (between,) = yield from chunked(off_planes, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
+    worst, gap = _largest_cluster(far, distances, contacts.links), [int(between.argmax())]
+    limit, fit_noise = MOST_OFF * atlas.reference.indicator.size, 0.0 if given else noise
+    off = _doubts_of_contacts(contacts, distances, far, worst, is_turned, limit)
+    sparse = [*beyond("sparse", between[gap[0]], limit, (), (place_text(mesh.vertices[gap]),))]
+    sparse = [] if atlas.uncovered else sparse
+    places = [(contacts.points[i], contacts.normals[i]) for i in worst[: len(off)]]
+    places += [(mesh.vertices[i], mesh.normals[i]) for i in gap[: len(sparse)]]
     return replace(
         atlas,
-        contradictions=tuple(doubts),
-        agreement=_agreement(contacts, distances, far, worst, 0.0 if cloud.noise else noise),
-        unexplained=tuple(
-            place_at(contacts.points[i], contacts.normals[i], radius) for i in worst[: len(off)]
-        ),
+        contradictions=(*doubts, *_doubts_of_surface(atlas, fit_noise, most), *off, *sparse),
+        agreement=_agreement(contacts, distances, far, worst, fit_noise),
+        unexplained=tuple(place_at(*place, radius) for place in places),
     )
 
 
@@ -238,8 +254,21 @@ def _off_surface(
     distances, stds = atlas.distance(points)
     faces = atlas.reference.normals[atlas.reference.feet(points)[1]]
     far = too_far(distances, np.hypot(np.minimum(stds, most), noise))
-    is_turned = row_dot(faces, normals) < 0.0
+    is_turned = row_dot(faces, normals) < -AGREE
     return np.abs(distances), far | is_turned, is_turned
+
+
+def _off_planes(
+    charts: Charts, tree: Any, contacts: MeasuredContacts, points: Array, normals: Array
+) -> tuple[Array]:
+    """How far places (n, 3) of the surface are off the planes of the nearest contacts, (n,).
+
+    It is 0 on patches. Between them the surface may be anywhere up to these planes: an edge that no contact
+    is near is cut off by half of the distance of contacts.
+    """
+    nearest = tree.query(points)[1]
+    off = np.abs(row_dot(contacts.normals[nearest], points - contacts.points[nearest]))
+    return (np.where(covered(charts, points, normals), 0.0, off),)
 
 
 def _doubts_of_surface(atlas: Atlas, noise: float, most: float) -> Iterator[Doubt]:
@@ -263,12 +292,14 @@ def _doubts_of_contacts(
     far: NDArray[np.bool_],
     worst: Indices,
     is_turned: NDArray[np.bool_],
+    limit: float,
 ) -> list[Doubt]:
     """Whether more than a few contacts (n,) are far off the surface, given the worst cluster of them (k,).
 
-    Few may be off, as at sharp edges. But more side by side than a quadric has coefficients show a shape.
+    Few may be off up to the limit, as at sharp edges. But more side by side than a quadric has coefficients
+    show a shape.
     """
-    if not far.any() or (far.mean() <= FEW and len(worst) <= len(QUADRIC)):
+    if not far.any() or (far.mean() <= FEW and len(worst) <= len(QUADRIC) and distances[far].max() <= limit):
         return []
     words = f"{np.count_nonzero(far)} of {len(far)} contacts", place_text(contacts.points[worst[:1]])
     code = "confused" if is_turned[worst].any() else "off_surface"
@@ -313,6 +344,15 @@ class _Cloud(NamedTuple):
         _, piece = connected_pieces(np.nonzero(linked)[0], at[linked], len(near))
         return near[piece == piece[np.flatnonzero(near == i)]]
 
+    def middle(self, i: int, radius: float) -> int:
+        """The contact nearest to the mean of those around contact i that are of its wall.
+
+        Next to an edge no patch has contacts all around, but one farther in reaches the edge, too.
+        """
+        near = self.same_sheet(i, radius)
+        off = self.contacts.points[near] - self.contacts.points[near].mean(axis=0)
+        return int(near[np.argmin(row_dot(off, off))])
+
     def patches(self, places: Sequence[int], radius: float) -> list[Reconstruction | None]:
         """The patch of those contacts around each place that are of its wall; None where they carry none."""
         points, normals = self.contacts.points[places], self.contacts.normals[places]
@@ -332,25 +372,25 @@ class _Cloud(NamedTuple):
         from scipy.spatial import cKDTree
 
         points, own, every = self.contacts.points, self.same_sheet(i, 2.0 * r.radius), np.arange(AZIMUTHS)
+        own_tree, turns = cKDTree(points[own]), 2.0 * np.pi * every / AZIMUTHS
         domain = r.domain.radii(AZIMUTHS) / r.radius
-        rays = np.outer(
-            np.linspace(0.0, 1.0, RAY_PLACES + 1)[1:], domain + BETWEEN * self.contacts.reach[i] / r.radius
-        )
-        turns = 2.0 * np.pi * every / AZIMUTHS
-        x, y = r.radius * (rays * np.stack([np.cos(turns), np.sin(turns)])[:, None]).reshape(2, -1)
-        places = r.frame.to_world(np.stack([x, y, r.height(x, y)], axis=1))
-        away, mine = cKDTree(points[own]).query(places)
-        (to_any, nearest), mine = self.tree.query(places), own[mine]
-        normals = self.contacts.normals[nearest]
-        above, own_above = (row_dot(normals, some - points[nearest]) for some in (places, points[mine]))
-        is_other = np.abs(row_dot(normals, self.contacts.normals[mine])) < AGREE
-        is_beyond = (is_other & (above * own_above < 0.5 * above**2)).reshape(rays.shape)
-        is_end = is_beyond | (away > BETWEEN * self.contacts.reach[mine]).reshape(rays.shape)
-        is_end[-1] = True
-        end = is_end.argmax(axis=0)
-        last = rays[np.maximum(end - 1, 0), every]
+        low, high = np.zeros(AZIMUTHS), domain + BETWEEN * self.contacts.reach[i] / r.radius
+        for _ in range(RAY_ROUNDS):
+            rays = np.linspace(low, high, RAY_PLACES + 1)[1:]
+            x, y = r.radius * (rays * np.stack([np.cos(turns), np.sin(turns)])[:, None]).reshape(2, -1)
+            places = r.frame.to_world(np.stack([x, y, r.height(x, y)], axis=1))
+            away, mine = own_tree.query(places)
+            (to_any, nearest), mine = self.tree.query(places), own[mine]
+            normals = self.contacts.normals[nearest]
+            above, own_above = (row_dot(normals, some - points[nearest]) for some in (places, points[mine]))
+            is_other = np.abs(row_dot(normals, self.contacts.normals[mine])) < AGREE
+            is_beyond = (is_other & (above * own_above < 0.5 * above**2)).reshape(rays.shape)
+            is_end = is_beyond | (away > BETWEEN * self.contacts.reach[mine]).reshape(rays.shape)
+            is_end[-1] = True
+            end = is_end.argmax(axis=0)
+            low, high = np.vstack([low, rays])[end, every], rays[end, every]
         is_edge = is_beyond & (to_any < AT_EDGE * self.contacts.reach[nearest]).reshape(rays.shape)
-        return np.where(is_edge[end, every], last, np.minimum(last, domain))
+        return np.where(is_edge[end, every], low, np.minimum(low, domain))
 
     def longest_sure(self, i: int, radii: list[float], last: int) -> tuple[Reconstruction | None, int]:
         """The largest sure patch around contact i, or None; which radius it has.
@@ -414,8 +454,9 @@ def _patches(cloud: _Cloud, radius: float) -> Generator[float, None, tuple[list[
     for i in range(len(left)):
         if not left[i]:
             continue
+        left[i] = False
+        i = cloud.middle(i, radius)
         r, last = cloud.longest_sure(i, radii, last)
-        left[cloud.same_sheet(i, MISSING * radius) if r is None else i] = False
         if r is not None:
             found.append(r)
             tables.append(tabulate(r, cloud.rim(i, r), deviations=True))
