@@ -35,8 +35,10 @@ from .unfelt import place_at, uncovered_places
 FEWEST = 40  # The smallest patch has this many contacts.
 SOME_PLACES = 24  # The number of places at which it is tried how large a patch has to be.
 WIDENING, WIDENINGS = 1.4, 10  # Patches grow by this factor, at most this often.
-# A contact carries no patch if one is nearer than the first share of its radius, and reaches it: up to the
-PATCHES_APART, COVERED = 0.6, 1.0  # second share of the radius of its domain.
+# A patch is looked for at contacts that are farther than the first share of its radius from the middles of
+# others, or farther out on them than the second. Where there is none, none is looked for as near as that:
+# otherwise a patch bulges to a single contact that is off (test_measured).
+PATCHES_APART, COVERED = 0.6, 1.0
 # A patch goes on to an edge where a contact is within this share of its neighbors' reach: with 0.3 an L whose
 # contacts end half a spacing before its edges is in doubt (test_measured), with 0.5 a pear of 400 even
 AT_EDGE = 0.45  # contacts has a spike of a twentieth of its size.
@@ -454,13 +456,13 @@ def _patches(cloud: _Cloud, radius: float) -> Generator[float, None, tuple[list[
     for i in range(len(left)):
         if not left[i]:
             continue
-        left[i] = False
-        i = cloud.middle(i, radius)
-        r, last = cloud.longest_sure(i, radii, last)
+        middle = cloud.middle(i, radius)
+        r, last = cloud.longest_sure(middle, radii, last)
+        left[cloud.same_sheet(i, PATCHES_APART * radius) if r is None else i] = False
         if r is not None:
             found.append(r)
-            tables.append(tabulate(r, cloud.rim(i, r), deviations=True))
-            chart, some = stacked([r], tables[-1:]), cloud.same_sheet(i, PATCHES_APART * r.radius)
+            tables.append(tabulate(r, cloud.rim(middle, r), deviations=True))
+            chart, some = stacked([r], tables[-1:]), cloud.same_sheet(middle, PATCHES_APART * r.radius)
             x, y, _ = chart.local(points[some], np.arange(len(some)), np.zeros(len(some), dtype=np.intp))
             left[some] &= chart.shares(x, y, np.zeros(len(some), dtype=np.intp)) > COVERED
         yield 1.0 - float(left.mean())
