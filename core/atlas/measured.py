@@ -198,13 +198,16 @@ def _least_radius(points: Array) -> float:
     from scipy.spatial import cKDTree
 
     if len(points) < FEWEST:
-        raise ValueError(f"contours_or_strokes: expected {FEWEST} contacts or more, got {len(points)}")
+        raise ValueError(
+            f"contacts: expected {FEWEST} or more at different places, got {len(points)}: feel more of the "
+            "object, or reconstruct a single patch from curves through a point"
+        )
     some = points[np.linspace(0, len(points) - 1, SOME_PLACES).astype(np.intp)]
     radius = float(np.median(cKDTree(points).query(some, FEWEST)[0][:, -1]))
     if radius < SMALLEST:
         raise ValueError(
-            f"contours_or_strokes: expected contacts at least {SMALLEST:g} apart, got nearer ones: use "
-            "another unit of length"
+            f"contacts: expected them at least {SMALLEST:g} apart, got nearer ones: use another unit of "
+            "length"
         )
     gap = float(np.spacing(np.abs(points).max()))
     if gap > TOUCH_ROUNDING * radius:
@@ -439,8 +442,8 @@ class _Cloud(NamedTuple):
             radius *= WIDENING
             yield 0.0
         raise ValueError(
-            "contours_or_strokes: expected contacts all around at least one of them, got "
-            f"{len(points)} without"
+            f"contacts: expected others all around at least one of them, got {len(points)} without: make "
+            "strokes nearer to each other"
         )
 
 
