@@ -147,7 +147,7 @@ REASONS = {
     ),
     "off_surface": Reason(
         "{0} are off the surface or face the other way, by up to {value:.2g}, most together around {1}",
-        ("feel more there", "give their noise", "leave out contacts that are wrong"),
+        ("feel more there", "give their noise", "leave out wrong ones"),
     ),
     "confused": Reason(
         "{0} are off the surface or face the other way, by up to {value:.2g}, most together around {1}, "
