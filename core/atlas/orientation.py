@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..triangles import normalized, row_dot
@@ -30,7 +31,6 @@ BEND = 0.1  # Links along which the surface goes on come before those around edg
 STROKE = 0.5  # and those along strokes before others.
 STEP = 2.0  # Successive contacts are linked if they are apart by at most this multiple of neighbors' reach.
 LEAST_VOTE = 1e-6  # No vote counts less.
-BRIDGES = 8  # Pieces are linked by this many of their nearest contacts.
 OPPOSED = -0.3  # A link contradicts the sides of its contacts if its cosine is less.
 DOUBTED = 0.02  # Not more contacts than this share may contradict their neighbors,
 CONFUSED = 0.05  # and not more than this share may have the other side of a wall among their neighbors.
@@ -130,10 +130,15 @@ def oriented(
 
     Raises ValueError if nothing tells the outer side.
     """
-    links = _bridged(points, planes.normals, *_links(points, planes, stroke))
-    sides, order, ends = _propagated_signs(points, planes.normals, *links)
+    i, j, weights = _links(points, planes, stroke)
+    # Winding numbers choose between the signs of pieces, so any link between these will do.
+    roots = np.unique(connected_pieces(i, j, len(points))[1], return_index=True)[1]
+    i, j = np.append(i, 0 * roots[1:]), np.append(j, roots[1:])
+    weights = np.append(weights, np.full(len(roots) - 1, 1.0 / LEAST_VOTE))
+    sides, order, ends = _propagated_signs(points, planes.normals, i, j, weights)
     normals = sides[:, None] * planes.normals
-    turns, number = _winding_signs(points[order], normals[order], planes.areas[order], ends)
+    is_root = np.isin(order, roots)
+    turns, number = _winding_signs(points[order], normals[order], planes.areas[order], ends, is_root)
     normals[order] *= turns[:, None]
     return normals * _global_sign(normals, known, up, number)
 
@@ -153,27 +158,6 @@ def _weights(points: Array, normals: Array, i: Indices, j: Indices) -> Array:
     """How uncertain it is which side of one contact follows from another, (m,)."""
     cosine, bend = reflection_agreement(points, normals, i, j)
     return 1e-6 + 1.0 - np.abs(cosine) + BEND * bend**2
-
-
-def _bridged(
-    points: Array, normals: Array, i: Indices, j: Indices, weights: Array
-) -> tuple[Indices, Indices, Array]:
-    """The links and those between pieces that they do not connect, from the nearest contacts of these."""
-    from scipy.spatial import cKDTree
-
-    while True:
-        count, piece = connected_pieces(i, j, len(points))
-        if count == 1:
-            return i, j, weights
-        is_mine = piece == np.bincount(piece).argmin()
-        mine, others = np.flatnonzero(is_mine), np.flatnonzero(~is_mine)
-        away, near = cKDTree(points[others]).query(points[mine])
-        some = np.argsort(away, kind="stable")[:BRIDGES]
-        a, b = mine[some], others[near[some]]
-        i, j = np.append(i, a), np.append(j, b)
-        # They come after all links of neighbors, the shortest first.
-        far = 2.0 + away[some] / np.ptp(points, axis=0).max()
-        weights = np.append(weights, far + _weights(points, normals, a, b))
 
 
 def _propagated_signs(
@@ -203,7 +187,9 @@ def _propagated_signs(
     return np.array(sides), order, np.arange(n) + np.array(counts)[order]
 
 
-def _winding_signs(points: Array, normals: Array, areas: Array, ends: Indices) -> tuple[Array, float]:
+def _winding_signs(
+    points: Array, normals: Array, areas: Array, ends: Indices, is_root: NDArray[np.bool_]
+) -> tuple[Array, float]:
     """The signs (n,) of contacts that bring winding numbers at contacts nearest to a half; their mean.
 
     On a closed surface the winding number is 1 inside, 0 outside and a half on it (Barill et al. 2018). One
@@ -212,10 +198,11 @@ def _winding_signs(points: Array, normals: Array, areas: Array, ends: Indices) -
 
     points, normals : (n, 3), in the order of the tree
     ends : (n,), where what follows from each contact ends
+    is_root : (n,), which contacts a piece follows from
     """
     n = len(points)
     counts = ends - np.arange(n)
-    starts = np.flatnonzero((counts >= SMALL * n) & (counts <= (1.0 - SMALL) * n) | (counts == n))
+    starts = np.flatnonzero((counts >= SMALL * n) & (counts <= (1.0 - SMALL) * n) | is_root)
     ends, counts = ends[starts], counts[starts]
     probes = np.random.default_rng(0).permutation(n)[:PROBES]
     numbers = np.zeros((len(probes), len(starts)))
