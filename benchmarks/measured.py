@@ -310,10 +310,10 @@ def oriented_strokes(thing, gap):
     normals = np.vstack([n for _, n in strokes])
     felt = [p + rng.normal(0.0, NOISE, p.shape) for p, _ in strokes]
     start = process_time()
-    points, stroke = np.vstack(felt), np.repeat(np.arange(len(felt)), [len(some) for some in felt])
+    points = np.vstack(felt)
     planes = planes_of(points, NOISE)
     try:
-        found = oriented(points, planes, stroke)
+        found = oriented(points, planes)
     except ValueError as error:
         return felt, np.nan, f"refused: {error}", process_time() - start
     doubt = next(doubts_of(points, found, planes), None)

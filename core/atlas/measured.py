@@ -123,8 +123,8 @@ def _judged(
     worst, gap = _largest_cluster(far, distances, contacts.links), [int(between.argmax())]
     limit, fit_noise = MOST_OFF * atlas.reference.indicator.size, 0.0 if given else noise
     off = _doubts_of_contacts(contacts, distances, far, worst, is_turned, limit)
-    sparse = [*beyond("sparse", between[gap[0]], limit, (), (place_text(mesh.vertices[gap]),))]
-    sparse = [] if atlas.uncovered else sparse
+    where = (place_text(mesh.vertices[gap]),)
+    sparse = [] if atlas.uncovered else [*beyond("sparse", between[gap[0]], limit, (), where)]
     places = [(contacts.points[i], contacts.normals[i]) for i in worst[: len(off)]]
     places += [(mesh.vertices[i], mesh.normals[i]) for i in gap[: len(sparse)]]
     return replace(
@@ -137,7 +137,7 @@ def _judged(
 
 def _felt(
     given: Sequence[ArrayLike | Contour], noise: float | None, tolerance: float | None
-) -> tuple[tuple[Array, Array, Indices, Array], float, float]:
+) -> tuple[tuple[Array, Array, Array], float, float]:
     """The arguments of `_contacts`: all contacts, each once; their noise, and the least radius of a patch.
 
     Raises ValueError for contacts that are too few or too near, and for a noise or a tolerance that is large.
@@ -152,33 +152,31 @@ def _felt(
     points = points[once]
     radius = _least_radius(points)
     size = float(np.ptp(points, axis=0).max())
-    if noise is None:
-        noise = max(curve.noise or 0.0 for curve in curves)
+    noise = max(curve.noise or 0.0 for curve in curves) if noise is None else noise
     if noise > size:
         raise ValueError(f"noise: expected less than the size of what was felt, {size:.3g}, got {noise:.3g}")
     if tolerance is not None and tolerance > COARSEST * size:
         raise ValueError(
             f"tolerance: expected at most {COARSEST * size:.3g}, a tenth of the size, got {tolerance:.3g}"
         )
-    stroke = np.repeat(np.arange(len(curves)), [len(curve.points) for curve in curves])[once]
-    balls = np.array([curve.ball or 0.0 for curve in curves])[stroke]
+    balls = np.repeat([curve.ball or 0.0 for curve in curves], [len(curve.points) for curve in curves])
     normals = [0.0 * c.points + np.nan if c.normals is None else c.normals for c in curves]
-    return (points, np.vstack(normals)[once], stroke, balls), noise, radius
+    return (points, np.vstack(normals)[once], balls[once]), noise, radius
 
 
 def _contacts(
-    points: Array, normals: Array, stroke: Indices, balls: Array, outward: ArrayLike | None, noise: float
+    points: Array, normals: Array, balls: Array, outward: ArrayLike | None, noise: float
 ) -> tuple[MeasuredContacts, list[Doubt]]:
     """Contacts with outward normals, and why these are in doubt, if they are.
 
     points, normals : (n, 3); normals as they were measured, or NaN
-    stroke, balls : (n,), the stroke of each, and the radius of the ball whose center it is, or 0
+    balls : (n,), the radius of the ball whose center it is, or 0
     """
     up = None if outward is None else unit_vector("outward", outward)
     known, planes = np.isfinite(normals[:, 0]), planes_of(points, noise)
     normals[known] = unit_vectors("normals", normals[known])
     if not known.all():
-        normals[~known] = oriented(points, planes, stroke, np.where(known[:, None], normals, 0.0), up)[~known]
+        normals[~known] = oriented(points, planes, np.where(known[:, None], normals, 0.0), up)[~known]
     else:
         _require_one_side(points, normals)
     doubts = list(doubts_of(points, normals, planes))
@@ -321,14 +319,12 @@ def _agreement(
     """How contacts (n,) agree with the surface if there is no doubt; `noise` is that of the fit, or 0."""
     message = "The surface is closed, and all contacts agree with it."
     if far.any():
-        most, where = distances[far].max(), place_text(contacts.points[worst[:1]])
         message = (
             f"The surface is closed. All but {np.count_nonzero(far)} of {len(far)} contacts agree with it, "
-            f"which are off by up to {most:.2g}, most together around {where}."
+            f"which are off by up to {distances[far].max():.2g}, most together around "
+            f"{place_text(contacts.points[worst[:1]])}."
         )
-    if noise:
-        message += f" No noise was given; that of the fit is {noise:.2g}."
-    return message
+    return message + (f" No noise was given; that of the fit is {noise:.2g}." if noise else "")
 
 
 class _Cloud(NamedTuple):

@@ -4,7 +4,7 @@
 
 Hoppe et al. 1992: a minimal spanning tree of neighbors carries the outer side from one contact to the next.
 Of two contacts on an arc one normal is the mirror image of the other in the plane between them (Koenig and
-Gumhold 2009), also across a sharp edge, a wall or a gap. Links along strokes come first.
+Gumhold 2009), also across a sharp edge, a wall or a gap.
 """
 
 from collections.abc import Iterator
@@ -27,9 +27,7 @@ FLATTER, THROUGH = 0.5, 2.0  # A neighbor's plane is flatter by this factor, at 
 SHARPENINGS = 3  # and is passed on from neighbor to neighbor this often.
 LINKS = 12  # A contact is linked with this many of its neighbors.
 AT_ONCE = 20_000  # This many contacts are taken at once.
-BEND = 0.1  # Links along which the surface goes on come before those around edges and across gaps,
-STROKE = 0.5  # and those along strokes before others.
-STEP = 2.0  # Successive contacts are linked if they are apart by at most this multiple of neighbors' reach.
+BEND = 0.1  # Links along which the surface goes on come before those around edges and across gaps.
 LEAST_VOTE = 1e-6  # No vote counts less.
 OPPOSED = -0.3  # A link contradicts the sides of its contacts if its cosine is less.
 DOUBTED = 0.02  # Not more contacts than this share may contradict their neighbors,
@@ -119,23 +117,19 @@ def reflection_agreement(points: Array, normals: Array, i: Indices, j: Indices) 
     return row_dot(normals[i], normals[j]) - 2.0 * a * b, np.maximum(np.abs(a), np.abs(b))
 
 
-def oriented(
-    points: Array, planes: Planes, stroke: Indices, known: Array | None = None, up: Array | None = None
-) -> Array:
+def oriented(points: Array, planes: Planes, known: Array | None = None, up: Array | None = None) -> Array:
     """Outward unit normals (n, 3) of points (n, 3) with planes.
 
-    stroke : (n,), the stroke of each
     known : (n, 3), measured unit normals; 0 where there are none
     up : (3,), a hint, a direction to the outer side
 
     Raises ValueError if nothing tells the outer side.
     """
-    i, j, weights = _links(points, planes, stroke)
+    i, j = np.repeat(np.arange(len(points)), LINKS), planes.links.ravel()
     # Winding numbers choose between the signs of pieces, so any link between these will do.
     roots = np.unique(connected_pieces(i, j, len(points))[1], return_index=True)[1]
     i, j = np.append(i, 0 * roots[1:]), np.append(j, roots[1:])
-    weights = np.append(weights, np.full(len(roots) - 1, 1.0 / LEAST_VOTE))
-    sides, order, ends = _propagated_signs(points, planes.normals, i, j, weights)
+    sides, order, ends = _propagated_signs(points, planes.normals, i, j)
     normals = sides[:, None] * planes.normals
     is_root = np.isin(order, roots)
     turns, number = _winding_signs(points[order], normals[order], planes.areas[order], ends, is_root)
@@ -143,25 +137,8 @@ def oriented(
     return normals * _global_sign(normals, known, up, number)
 
 
-def _links(points: Array, planes: Planes, stroke: Indices) -> tuple[Indices, Indices, Array]:
-    """Pairs of neighbors and of successive contacts, (m,) each, and their weights (m,)."""
-    i, j = np.repeat(np.arange(len(points)), LINKS), planes.links.ravel()
-    before = np.flatnonzero(np.diff(stroke) == 0)
-    step = np.linalg.norm(points[before + 1] - points[before], axis=1)
-    before = before[step < STEP * planes.reach[before]]
-    i, j = np.append(i, before), np.append(j, before + 1)
-    factors = np.repeat([1.0, STROKE], [planes.links.size, len(before)])
-    return i, j, factors * _weights(points, planes.normals, i, j)
-
-
-def _weights(points: Array, normals: Array, i: Indices, j: Indices) -> Array:
-    """How uncertain it is which side of one contact follows from another, (m,)."""
-    cosine, bend = reflection_agreement(points, normals, i, j)
-    return 1e-6 + 1.0 - np.abs(cosine) + BEND * bend**2
-
-
 def _propagated_signs(
-    points: Array, normals: Array, i: Indices, j: Indices, weights: Array
+    points: Array, normals: Array, i: Indices, j: Indices
 ) -> tuple[Array, Indices, Indices]:
     """The sides (n,), 1 or -1, of normals (n, 3) that follow from the first along the minimal tree of links.
 
@@ -171,7 +148,8 @@ def _propagated_signs(
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import depth_first_order, minimum_spanning_tree
 
-    n, (cosine, _) = len(points), reflection_agreement(points, normals, i, j)
+    n, (cosine, bend) = len(points), reflection_agreement(points, normals, i, j)
+    weights = 1e-6 + 1.0 - np.abs(cosine) + BEND * bend**2
     # Neighbors that have each other as a neighbor count twice, so they are more likely of one wall.
     votes = coo_matrix((cosine / weights, (np.minimum(i, j), np.maximum(i, j))), (n, n)).tocsr()
     votes.sum_duplicates()

@@ -180,10 +180,9 @@ def sides():
     """Strokes over two balls, one in the other, farther apart than half of their distance, and nearer."""
     found = []
     for gap in (0.5, 0.05):
-        strokes = [*sphere(1.0, gap), *sphere(0.8, gap)]
-        points = np.vstack(strokes)
-        planes, stroke = planes_of(points, 0.0), np.repeat(np.arange(len(strokes)), list(map(len, strokes)))
-        found.append(list(doubts_of(points, oriented(points, planes, stroke), planes)))
+        points = np.vstack([*sphere(1.0, gap), *sphere(0.8, gap)])
+        planes = planes_of(points, 0.0)
+        found.append(list(doubts_of(points, oriented(points, planes), planes)))
     return found
 
 
