@@ -266,10 +266,13 @@ def _off_planes(
 ) -> tuple[Array]:
     """How far places (n, 3) of the surface are off the planes of the nearest contacts, (n,).
 
-    It is 0 on patches. Between them the surface may be anywhere up to these planes: an edge that no contact
-    is near is cut off by half of the distance of contacts.
+    Of contacts nearby it is one that faces alike, if there is any. It is 0 on patches. Between them the
+    surface may be anywhere up to these planes: an edge that no contact is near is cut off by half of the
+    distance of contacts.
     """
-    nearest = tree.query(points)[1]
+    near = tree.query(points, ABREAST)[1]
+    is_alike = np.einsum("nki,ni->nk", contacts.normals[near], normals) > AGREE
+    nearest = near[np.arange(len(points)), is_alike.argmax(axis=1)]
     off = np.abs(row_dot(contacts.normals[nearest], points - contacts.points[nearest]))
     return (np.where(covered(charts, points, normals), 0.0, off),)
 
