@@ -121,7 +121,7 @@ def _judged(
     off_planes = partial(_off_planes, atlas.charts, cKDTree(contacts.points), contacts)
     (between,) = yield from chunked(off_planes, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
     worst, gap = _largest_cluster(far, distances, contacts.links), [int(between.argmax())]
-    limit, fit_noise = MOST_OFF * atlas.reference.indicator.size, 0.0 if given else noise
+    limit, fit_noise = MOST_OFF * float(np.ptp(contacts.points, axis=0).max()), 0.0 if given else noise
     off = _doubts_of_contacts(contacts, distances, far, worst, is_turned, limit)
     where = (place_text(mesh.vertices[gap]),)
     sparse = [] if atlas.uncovered else [*beyond("sparse", between[gap[0]], limit, (), where)]
