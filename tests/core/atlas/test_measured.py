@@ -503,7 +503,7 @@ def test_deviations_are_those_of_the_mean_of_overlapping_patches():
 
 
 def test_above_a_cap_the_deviation_is_of_what_may_rise_beyond_its_rim():
-    out, heights = np.array([0.3, 0.35, 0.45]), np.array([0.5, 0.7, 0.7])
+    out, heights = np.array([0.3, 0.35, 0.45]), np.array([0.5, 0.65, 0.7])
     feet = np.column_stack([out, np.zeros(3), np.sqrt(1.0 - out**2)])
     distance, std = cap_atlas().distance((1.0 + heights)[:, None] * feet)
     assert distance == pytest.approx(heights, abs=0.01)
