@@ -261,12 +261,10 @@ class Doubt:
         }
 
 
-def beyond(
-    code: str, value: float, limit: float, useless: tuple[str, ...] = (), words: tuple[str, ...] = ()
-) -> Iterator[Doubt]:
+def beyond(code: str, value: float, limit: float, useless: tuple[str, ...] = ()) -> Iterator[Doubt]:
     """The doubt of this code, if the value is beyond the limit."""
     if value > limit:
-        yield Doubt(code, value, limit, words, useless)
+        yield Doubt(code, value, limit, useless=useless)
 
 
 def joined(advice: Sequence[str]) -> str:

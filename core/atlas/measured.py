@@ -120,13 +120,14 @@ def _judged(
     distances, far, is_turned = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
     off_planes = partial(_off_planes, atlas.charts, cKDTree(contacts.points), contacts)
     (between,) = yield from chunked(off_planes, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
-    worst, gap = _largest_cluster(far, distances, contacts.links), [int(between.argmax())]
+    worst, widest = _largest_cluster(far, distances, contacts.links), np.argsort(-between, kind="stable")
     limit, fit_noise = MOST_OFF * float(np.ptp(contacts.points, axis=0).max()), 0.0 if given else noise
     off = _doubts_of_contacts(contacts, distances, far, worst, is_turned, limit)
-    where = (place_text(mesh.vertices[gap]),)
-    sparse = [] if atlas.uncovered else [*beyond("sparse", between[gap[0]], limit, (), where)]
+    gaps = widest[:0] if atlas.uncovered else widest[between[widest] > limit]
+    sparse = [Doubt("sparse", between[i], limit, (place_text(mesh.vertices[[i]]),)) for i in gaps[:1]]
+    # A finger may miss the first of these, so others follow.
     places = [(contacts.points[i], contacts.normals[i]) for i in worst[: len(off)]]
-    places += [(mesh.vertices[i], mesh.normals[i]) for i in gap[: len(sparse)]]
+    places += [(mesh.vertices[i], mesh.normals[i]) for i in gaps]
     return replace(
         atlas,
         contradictions=(*doubts, *_doubts_of_surface(atlas, fit_noise, most), *off, *sparse),
