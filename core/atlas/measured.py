@@ -328,7 +328,9 @@ def _agreement(
             f"which are off by up to {distances[far].max():.2g}, most together around "
             f"{place_text(contacts.points[worst[:1]])}."
         )
-    return message + (f" No noise was given; that of the fit is {noise:.2g}." if noise else "")
+    if noise:
+        message += f" No noise was given; that of the fit is {noise:.2g}."
+    return message
 
 
 class _Cloud(NamedTuple):
