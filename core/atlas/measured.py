@@ -43,7 +43,7 @@ PATCHES_APART, COVERED = 0.6, 1.0
 # contacts end half a spacing before its edges is in doubt (test_measured), with 0.5 a pear of 400 even
 AT_EDGE = 0.45  # contacts has a spike of a twentieth of its size.
 RAY_PLACES, RAY_ROUNDS = 16, 2  # Where a patch ends is looked for at so many places on each ray, so often.
-ABREAST = 8  # The number of neighbors of each contact that are to face the same way.
+ABREAST = 8  # Of this many neighbors the normals are to face the same way, or one is taken that does.
 SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
 OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
 # A ball is too large if neighbors below its centers lie the other way by more than this share of their
