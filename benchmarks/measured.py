@@ -17,7 +17,9 @@ parallel planes, seeded. It prints Markdown tables:
     longer gaps it is that of the whole object if many normals are wrong without one of their own;
 (c) with `--features`, dents, bumps, grooves and steps of five heights from 10 to 100 noises on three objects,
     along the ways from their middles: the verdict, the share of the contacts in the feature that are off by
-    more than five deviations and noises, their mean distance in noises, and that of the others.
+    more than five deviations and noises, their mean distance in noises, and that of the others;
+(d) with `--even`, few contacts that are spread evenly, with normals and without: the verdict, and how far
+    the surface is off the object, and the object off the surface, in percent of the size.
 """
 
 import argparse
@@ -29,7 +31,7 @@ import numpy as np
 
 import core
 from core.atlas.orientation import doubts_of, oriented, planes_of
-from core.triangles import normalized
+from core.triangles import normalized, triangle_cross
 from tools import blender
 
 from . import machine, table
@@ -62,6 +64,7 @@ FINE = 0.5  # Contacts along a stroke are this share of the gap apart.
 # half width within which contacts are in them.
 WIDTHS = {"dent": 0.1, "bump": 0.1, "groove": 0.05, "step": 0.05}
 FEATURED, HEIGHTS, IN_FEATURE = ("ball", "egg", "box"), (10, 20, 40, 70, 100), 1.2
+EVEN, CHECKED = (400, 800, 2000), 3000  # Contacts that are spread evenly, and points of the object.
 OBJECTS = {
     "ball": lambda: revolved(arc(1.0, 0.0, 0.0, np.pi)),
     "egg": lambda: revolved(arc(1.0, 0.0, 0.0, np.pi) * (0.6, 1.0)),
@@ -303,6 +306,46 @@ def print_features(only, first):
     table([*head, "elsewhere", "patches", "s"], rows)
 
 
+def spread(thing, count, rng):
+    """Contacts (n, 3) all over an object and normals: each is the farthest from those before of ten tried."""
+    across = triangle_cross(thing.vertices[thing.triangles])
+    areas = np.linalg.norm(across, axis=1)
+    face = rng.choice(len(areas), (count, 10), p=areas / areas.sum())
+    tried = np.einsum(
+        "nkc,nkcd->nkd", rng.dirichlet(np.ones(3), face.shape), thing.vertices[thing.triangles][face]
+    )
+    best = np.zeros(count, dtype=int)
+    for i in range(1, count):
+        points = tried[np.arange(i), best[:i]]
+        best[i] = np.linalg.norm(tried[i][:, None] - points, axis=2).min(axis=1).argmax()
+    every = np.arange(count)
+    return tried[every, best], normalized(across[face[every, best]])
+
+
+def print_even(only, first):
+    rows = []
+    for name, count in product((name for name in OBJECTS if only in name), EVEN):
+        with blender.quiet():
+            thing = Made(name, *OBJECTS[name]())
+        points, normals = spread(thing, count, np.random.default_rng(first))
+        object_points = spread(thing, CHECKED, np.random.default_rng(first + 1))[0]
+        for some in (normals, None):
+            try:
+                atlas = core.atlas_of([core.Contour(points, normals=some)])
+            except ValueError as error:
+                print(f"{name} {count}: {error}", file=sys.stderr, flush=True)
+                continue
+            surface = atlas.reference
+            off = [
+                away(thing.tree, surface.mesh.vertices).max(),
+                np.linalg.norm(surface.feet(object_points)[0] - object_points, axis=1).max(),
+            ]
+            measured = "yes" if some is not None else "no"
+            rows.append([name, str(count), measured, atlas.status, *(f"{100.0 * most:.2f}" for most in off)])
+            print(*rows[-1], atlas.message, file=sys.stderr, flush=True)
+    table(["object", "even contacts", "normals", "status", "% surface off", "% object off"], rows)
+
+
 def oriented_strokes(thing, gap):
     """Strokes so far apart: contacts, the share whose normals face outward, the doubt of these, seconds."""
     rng = np.random.default_rng(0)
@@ -310,10 +353,10 @@ def oriented_strokes(thing, gap):
     normals = np.vstack([n for _, n in strokes])
     felt = [p + rng.normal(0.0, NOISE, p.shape) for p, _ in strokes]
     start = process_time()
-    points, stroke = np.vstack(felt), np.repeat(np.arange(len(felt)), [len(some) for some in felt])
+    points = np.vstack(felt)
     planes = planes_of(points, NOISE)
     try:
-        found = oriented(points, planes, stroke)
+        found = oriented(points, planes)
     except ValueError as error:
         return felt, np.nan, f"refused: {error}", process_time() - start
     doubt = next(doubts_of(points, found, planes), None)
@@ -349,6 +392,7 @@ def main():
     parser.add_argument("--only", default="")
     parser.add_argument("--orientation", action="store_true")
     parser.add_argument("--features", action="store_true")
+    parser.add_argument("--even", action="store_true")
     options = parser.parse_args()
     for count, is_full in ((options.partial, False), (options.full, True)):
         if count:
@@ -358,6 +402,8 @@ def main():
             print_orientation(options.only, is_coarse)
     if options.features:
         print_features(options.only, options.first)
+    if options.even:
+        print_even(options.only, options.first)
     print(f"{machine('bpy', 'numpy', 'scipy')}.")
 
 

@@ -149,12 +149,16 @@ REASONS = {
     ),
     "off_surface": Reason(
         "{0} are off the surface or face the other way, by up to {value:.2g}, most together around {1}",
-        ("feel more there", "give their noise"),
+        ("feel more there", "give their noise", "leave out wrong ones"),
     ),
     "confused": Reason(
         "{0} are off the surface or face the other way, by up to {value:.2g}, most together around {1}, "
         "where strokes are farther apart than half of the wall or gap",
         ("make strokes nearer to each other", "measure normals"),
+    ),
+    "sparse": Reason(
+        "Contacts around {0} are so far apart that the surface between them may be off by {value:.2g}",
+        ("feel more there",),
     ),
     "unfelt": Reason("Nothing was felt beyond {0} where the object may go on", ("touch there",)),
     # A whole object that was touched.

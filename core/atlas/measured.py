@@ -23,7 +23,7 @@ from ..triangles import row_dot
 from ..verdict import Doubt, beyond
 from .charts import AZIMUTHS, Charts
 from .connectivity import Indices, connected_pieces
-from .field import AGREE
+from .field import AGREE, covered
 from .finger import FACING
 from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
@@ -35,15 +35,15 @@ from .unfelt import place_at, uncovered_places
 FEWEST = 40  # The smallest patch has this many contacts.
 SOME_PLACES = 24  # The number of places at which it is tried how large a patch has to be.
 WIDENING, WIDENINGS = 1.4, 10  # Patches grow by this factor, at most this often.
-# Patches are at least the first share of their radius from each other, but for contacts that are farther out
-# than the third, up to which a patch reaches. Contacts within the second share of the least radius of one
-# without a patch carry none either: otherwise a patch bulges to a single contact that is off (test_measured).
-PATCHES_APART, MISSING, COVERED = 0.6, 0.6, 1.0
+# A patch is looked for at contacts that are farther than the first share of its radius from the middles of
+# others, or farther out on them than the second. Where there is none, none is looked for as near as that:
+# otherwise a patch bulges to a single contact that is off (test_measured).
+PATCHES_APART, COVERED = 0.6, 1.0
 # A patch goes on to an edge where a contact is within this share of its neighbors' reach: with 0.3 an L whose
 # contacts end half a spacing before its edges is in doubt (test_measured), with 0.5 a pear of 400 even
 AT_EDGE = 0.45  # contacts has a spike of a twentieth of its size.
-RAY_PLACES = 24  # Where a patch ends is looked for at this many places on each ray.
-ABREAST = 8  # The number of neighbors of each contact that are to face the same way.
+RAY_PLACES, RAY_ROUNDS = 16, 2  # Where a patch ends is looked for at so many places on each ray, so often.
+ABREAST = 8  # Of this many neighbors the normals are to face the same way, or one is taken that does.
 SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
 OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
 # A ball is too large if neighbors below its centers lie the other way by more than this share of their
@@ -51,6 +51,8 @@ OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one
 TURNED = 0.25
 GROWN = 0.012  # Without a tolerance, patches grow up to this mean deviation, as a share of the radius.
 COARSEST = 0.1  # The tolerance is at most this share of the size: larger patches do not show the object.
+# Contacts and surface are off each other by at most this share of the size. Without, 5 of 10 "ok" on evenly
+MOST_OFF = 0.02  # spread contacts are off by up to 4 % of the size (python -m benchmarks.measured --even).
 
 
 def atlas_of(
@@ -98,28 +100,45 @@ def cover_contacts(
     radius, noise = yield from cloud.least_radius_and_noise(radius)
     found, charts = yield from _patches(cloud._replace(noise=noise), radius)
     reference = yield from part_of(joined_surface(found, charts, largest, contacts.off), 1.0, 1.0)
-    atlas = Atlas(
-        tuple(found), charts, reference, largest, uncovered_places(reference, charts), contacts=contacts
-    )
-    most = largest or GROWN * radius
+    uncovered = uncovered_places(reference, charts)
+    atlas = Atlas(tuple(found), charts, reference, largest, uncovered, contacts=contacts)
+    return (yield from _judged(atlas, contacts, doubts, cloud.noise, noise, radius))
+
+
+def _judged(
+    atlas: Atlas, contacts: MeasuredContacts, doubts: list[Doubt], given: float, noise: float, radius: float
+) -> Generator[float, None, Atlas]:
+    """The atlas with its doubts: these, and those of how contacts and surface are off each other; yields 1.
+
+    given, noise : the noise that was given or 0, and that of the fit
+    radius : the least of a patch
+    """
+    from scipy.spatial import cKDTree
+
+    mesh, most = atlas.reference.mesh, atlas.tolerance or GROWN * radius
     off_surface = partial(_off_surface, atlas, noise, most)
     distances, far, is_turned = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
-    worst = _largest_cluster(far, distances, contacts.links)
-    off = _doubts_of_contacts(contacts, distances, far, worst, is_turned)
-    doubts += [*_doubts_of_surface(atlas, 0.0 if cloud.noise else noise, most), *off]
+    off_planes = partial(_off_planes, atlas.charts, cKDTree(contacts.points), contacts)
+    (between,) = yield from chunked(off_planes, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
+    worst, widest = _largest_cluster(far, distances, contacts.links), np.argsort(-between, kind="stable")
+    limit, fit_noise = MOST_OFF * float(np.ptp(contacts.points, axis=0).max()), 0.0 if given else noise
+    off = _doubts_of_contacts(contacts, distances, far, worst, is_turned, limit)
+    gaps = widest[:0] if atlas.uncovered else widest[between[widest] > limit]
+    sparse = [Doubt("sparse", between[i], limit, (place_text(mesh.vertices[[i]]),)) for i in gaps[:1]]
+    # A finger may miss the first of these, so others follow.
+    places = [(contacts.points[i], contacts.normals[i]) for i in worst[: len(off)]]
+    places += [(mesh.vertices[i], mesh.normals[i]) for i in gaps]
     return replace(
         atlas,
-        contradictions=tuple(doubts),
-        agreement=_agreement(contacts, distances, far, worst, 0.0 if cloud.noise else noise),
-        unexplained=tuple(
-            place_at(contacts.points[i], contacts.normals[i], radius) for i in worst[: len(off)]
-        ),
+        contradictions=(*doubts, *_doubts_of_surface(atlas, fit_noise, most), *off, *sparse),
+        agreement=_agreement(contacts, distances, far, worst, fit_noise),
+        unexplained=tuple(place_at(*place, radius) for place in places),
     )
 
 
 def _felt(
     given: Sequence[ArrayLike | Contour], noise: float | None, tolerance: float | None
-) -> tuple[tuple[Array, Array, Indices, Array], float, float]:
+) -> tuple[tuple[Array, Array, Array], float, float]:
     """The arguments of `_contacts`: all contacts, each once; their noise, and the least radius of a patch.
 
     Raises ValueError for contacts that are too few or too near, and for a noise or a tolerance that is large.
@@ -134,33 +153,31 @@ def _felt(
     points = points[once]
     radius = _least_radius(points)
     size = float(np.ptp(points, axis=0).max())
-    if noise is None:
-        noise = max(curve.noise or 0.0 for curve in curves)
+    noise = max(curve.noise or 0.0 for curve in curves) if noise is None else noise
     if noise > size:
         raise ValueError(f"noise: expected less than the size of what was felt, {size:.3g}, got {noise:.3g}")
     if tolerance is not None and tolerance > COARSEST * size:
         raise ValueError(
             f"tolerance: expected at most {COARSEST * size:.3g}, a tenth of the size, got {tolerance:.3g}"
         )
-    stroke = np.repeat(np.arange(len(curves)), [len(curve.points) for curve in curves])[once]
-    balls = np.array([curve.ball or 0.0 for curve in curves])[stroke]
+    balls = np.repeat([curve.ball or 0.0 for curve in curves], [len(curve.points) for curve in curves])
     normals = [0.0 * c.points + np.nan if c.normals is None else c.normals for c in curves]
-    return (points, np.vstack(normals)[once], stroke, balls), noise, radius
+    return (points, np.vstack(normals)[once], balls[once]), noise, radius
 
 
 def _contacts(
-    points: Array, normals: Array, stroke: Indices, balls: Array, outward: ArrayLike | None, noise: float
+    points: Array, normals: Array, balls: Array, outward: ArrayLike | None, noise: float
 ) -> tuple[MeasuredContacts, list[Doubt]]:
     """Contacts with outward normals, and why these are in doubt, if they are.
 
     points, normals : (n, 3); normals as they were measured, or NaN
-    stroke, balls : (n,), the stroke of each, and the radius of the ball whose center it is, or 0
+    balls : (n,), the radius of the ball whose center it is, or 0
     """
     up = None if outward is None else unit_vector("outward", outward)
     known, planes = np.isfinite(normals[:, 0]), planes_of(points, noise)
     normals[known] = unit_vectors("normals", normals[known])
     if not known.all():
-        normals[~known] = oriented(points, planes, stroke, np.where(known[:, None], normals, 0.0), up)[~known]
+        normals[~known] = oriented(points, planes, np.where(known[:, None], normals, 0.0), up)[~known]
     else:
         _require_one_side(points, normals)
     doubts = list(doubts_of(points, normals, planes))
@@ -180,13 +197,16 @@ def _least_radius(points: Array) -> float:
     from scipy.spatial import cKDTree
 
     if len(points) < FEWEST:
-        raise ValueError(f"contours_or_strokes: expected {FEWEST} contacts or more, got {len(points)}")
+        raise ValueError(
+            f"contacts: expected {FEWEST} or more at different places, got {len(points)}: feel more of the "
+            "object, or reconstruct a single patch from curves through a point"
+        )
     some = points[np.linspace(0, len(points) - 1, SOME_PLACES).astype(np.intp)]
     radius = float(np.median(cKDTree(points).query(some, FEWEST)[0][:, -1]))
     if radius < SMALLEST:
         raise ValueError(
-            f"contours_or_strokes: expected contacts at least {SMALLEST:g} apart, got nearer ones: use "
-            "another unit of length"
+            f"contacts: expected them at least {SMALLEST:g} apart, got nearer ones: use another unit of "
+            "length"
         )
     gap = float(np.spacing(np.abs(points).max()))
     if gap > TOUCH_ROUNDING * radius:
@@ -238,8 +258,24 @@ def _off_surface(
     distances, stds = atlas.distance(points)
     faces = atlas.reference.normals[atlas.reference.feet(points)[1]]
     far = too_far(distances, np.hypot(np.minimum(stds, most), noise))
-    is_turned = row_dot(faces, normals) < 0.0
+    is_turned = row_dot(faces, normals) < -AGREE
     return np.abs(distances), far | is_turned, is_turned
+
+
+def _off_planes(
+    charts: Charts, tree: Any, contacts: MeasuredContacts, points: Array, normals: Array
+) -> tuple[Array]:
+    """How far places (n, 3) of the surface are off the planes of the nearest contacts, (n,).
+
+    Of contacts nearby it is one that faces alike, if there is any. It is 0 on patches. Between them the
+    surface may be anywhere up to these planes: an edge that no contact is near is cut off by half of the
+    distance of contacts.
+    """
+    near = tree.query(points, ABREAST)[1]
+    is_alike = np.einsum("nki,ni->nk", contacts.normals[near], normals) > AGREE
+    nearest = near[np.arange(len(points)), is_alike.argmax(axis=1)]
+    off = np.abs(row_dot(contacts.normals[nearest], points - contacts.points[nearest]))
+    return (np.where(covered(charts, points, normals), 0.0, off),)
 
 
 def _doubts_of_surface(atlas: Atlas, noise: float, most: float) -> Iterator[Doubt]:
@@ -263,12 +299,14 @@ def _doubts_of_contacts(
     far: NDArray[np.bool_],
     worst: Indices,
     is_turned: NDArray[np.bool_],
+    limit: float,
 ) -> list[Doubt]:
     """Whether more than a few contacts (n,) are far off the surface, given the worst cluster of them (k,).
 
-    Few may be off, as at sharp edges. But more side by side than a quadric has coefficients show a shape.
+    Few may be off up to the limit, as at sharp edges. But more side by side than a quadric has coefficients
+    show a shape.
     """
-    if not far.any() or (far.mean() <= FEW and len(worst) <= len(QUADRIC)):
+    if not far.any() or (far.mean() <= FEW and len(worst) <= len(QUADRIC) and distances[far].max() <= limit):
         return []
     words = f"{np.count_nonzero(far)} of {len(far)} contacts", place_text(contacts.points[worst[:1]])
     code = "confused" if is_turned[worst].any() else "off_surface"
@@ -285,10 +323,10 @@ def _agreement(
     """How contacts (n,) agree with the surface if there is no doubt; `noise` is that of the fit, or 0."""
     message = "The surface is closed, and all contacts agree with it."
     if far.any():
-        most, where = distances[far].max(), place_text(contacts.points[worst[:1]])
         message = (
             f"The surface is closed. All but {np.count_nonzero(far)} of {len(far)} contacts agree with it, "
-            f"which are off by up to {most:.2g}, most together around {where}."
+            f"which are off by up to {distances[far].max():.2g}, most together around "
+            f"{place_text(contacts.points[worst[:1]])}."
         )
     if noise:
         message += f" No noise was given; that of the fit is {noise:.2g}."
@@ -313,6 +351,15 @@ class _Cloud(NamedTuple):
         _, piece = connected_pieces(np.nonzero(linked)[0], at[linked], len(near))
         return near[piece == piece[np.flatnonzero(near == i)]]
 
+    def middle(self, i: int, radius: float) -> int:
+        """The contact nearest to the mean of those around contact i that are of its wall.
+
+        Next to an edge no patch has contacts all around, but one farther in reaches the edge, too.
+        """
+        near = self.same_sheet(i, radius)
+        off = self.contacts.points[near] - self.contacts.points[near].mean(axis=0)
+        return int(near[np.argmin(row_dot(off, off))])
+
     def patches(self, places: Sequence[int], radius: float) -> list[Reconstruction | None]:
         """The patch of those contacts around each place that are of its wall; None where they carry none."""
         points, normals = self.contacts.points[places], self.contacts.normals[places]
@@ -332,25 +379,25 @@ class _Cloud(NamedTuple):
         from scipy.spatial import cKDTree
 
         points, own, every = self.contacts.points, self.same_sheet(i, 2.0 * r.radius), np.arange(AZIMUTHS)
+        own_tree, turns = cKDTree(points[own]), 2.0 * np.pi * every / AZIMUTHS
         domain = r.domain.radii(AZIMUTHS) / r.radius
-        rays = np.outer(
-            np.linspace(0.0, 1.0, RAY_PLACES + 1)[1:], domain + BETWEEN * self.contacts.reach[i] / r.radius
-        )
-        turns = 2.0 * np.pi * every / AZIMUTHS
-        x, y = r.radius * (rays * np.stack([np.cos(turns), np.sin(turns)])[:, None]).reshape(2, -1)
-        places = r.frame.to_world(np.stack([x, y, r.height(x, y)], axis=1))
-        away, mine = cKDTree(points[own]).query(places)
-        (to_any, nearest), mine = self.tree.query(places), own[mine]
-        normals = self.contacts.normals[nearest]
-        above, own_above = (row_dot(normals, some - points[nearest]) for some in (places, points[mine]))
-        is_other = np.abs(row_dot(normals, self.contacts.normals[mine])) < AGREE
-        is_beyond = (is_other & (above * own_above < 0.5 * above**2)).reshape(rays.shape)
-        is_end = is_beyond | (away > BETWEEN * self.contacts.reach[mine]).reshape(rays.shape)
-        is_end[-1] = True
-        end = is_end.argmax(axis=0)
-        last = rays[np.maximum(end - 1, 0), every]
+        low, high = np.zeros(AZIMUTHS), domain + BETWEEN * self.contacts.reach[i] / r.radius
+        for _ in range(RAY_ROUNDS):
+            rays = np.linspace(low, high, RAY_PLACES + 1)[1:]
+            x, y = r.radius * (rays * np.stack([np.cos(turns), np.sin(turns)])[:, None]).reshape(2, -1)
+            places = r.frame.to_world(np.stack([x, y, r.height(x, y)], axis=1))
+            away, mine = own_tree.query(places)
+            (to_any, nearest), mine = self.tree.query(places), own[mine]
+            normals = self.contacts.normals[nearest]
+            above, own_above = (row_dot(normals, some - points[nearest]) for some in (places, points[mine]))
+            is_other = np.abs(row_dot(normals, self.contacts.normals[mine])) < AGREE
+            is_beyond = (is_other & (above * own_above < 0.5 * above**2)).reshape(rays.shape)
+            is_end = is_beyond | (away > BETWEEN * self.contacts.reach[mine]).reshape(rays.shape)
+            is_end[-1] = True
+            end = is_end.argmax(axis=0)
+            low, high = np.vstack([low, rays])[end, every], rays[end, every]
         is_edge = is_beyond & (to_any < AT_EDGE * self.contacts.reach[nearest]).reshape(rays.shape)
-        return np.where(is_edge[end, every], last, np.minimum(last, domain))
+        return np.where(is_edge[end, every], low, np.minimum(low, domain))
 
     def longest_sure(self, i: int, radii: list[float], last: int) -> tuple[Reconstruction | None, int]:
         """The largest sure patch around contact i, or None; which radius it has.
@@ -397,8 +444,8 @@ class _Cloud(NamedTuple):
             radius *= WIDENING
             yield 0.0
         raise ValueError(
-            "contours_or_strokes: expected contacts all around at least one of them, got "
-            f"{len(points)} without"
+            f"contacts: expected others all around at least one of them, got {len(points)} without: make "
+            "strokes nearer to each other"
         )
 
 
@@ -414,12 +461,13 @@ def _patches(cloud: _Cloud, radius: float) -> Generator[float, None, tuple[list[
     for i in range(len(left)):
         if not left[i]:
             continue
-        r, last = cloud.longest_sure(i, radii, last)
-        left[cloud.same_sheet(i, MISSING * radius) if r is None else i] = False
+        middle = cloud.middle(i, radius)
+        r, last = cloud.longest_sure(middle, radii, last)
+        left[cloud.same_sheet(i, PATCHES_APART * radius) if r is None else i] = False
         if r is not None:
             found.append(r)
-            tables.append(tabulate(r, cloud.rim(i, r), deviations=True))
-            chart, some = stacked([r], tables[-1:]), cloud.same_sheet(i, PATCHES_APART * r.radius)
+            tables.append(tabulate(r, cloud.rim(middle, r), deviations=True))
+            chart, some = stacked([r], tables[-1:]), cloud.same_sheet(middle, PATCHES_APART * r.radius)
             x, y, _ = chart.local(points[some], np.arange(len(some)), np.zeros(len(some), dtype=np.intp))
             left[some] &= chart.shares(x, y, np.zeros(len(some), dtype=np.intp)) > COVERED
         yield 1.0 - float(left.mean())

@@ -130,7 +130,7 @@ class Atlas(Judged):
     is_cut_short : whether touches ended because no more were allowed, or were stopped
     contacts : those that were measured before; None if they were felt for this atlas
     contradictions : doubts about these, the gravest first; agreement : a sentence on them if there is none
-    unexplained : the place around which most of those that do not agree are together
+    unexplained : where most of those that do not agree are together, and where contacts are too far apart
     """
 
     patches: tuple[Reconstruction, ...]

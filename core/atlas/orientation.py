@@ -4,13 +4,14 @@
 
 Hoppe et al. 1992: a minimal spanning tree of neighbors carries the outer side from one contact to the next.
 Of two contacts on an arc one normal is the mirror image of the other in the plane between them (Koenig and
-Gumhold 2009), also across a sharp edge, a wall or a gap. Links along strokes come first.
+Gumhold 2009), also across a sharp edge, a wall or a gap.
 """
 
 from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..triangles import normalized, row_dot
@@ -26,11 +27,8 @@ FLATTER, THROUGH = 0.5, 2.0  # A neighbor's plane is flatter by this factor, at 
 SHARPENINGS = 3  # and is passed on from neighbor to neighbor this often.
 LINKS = 12  # A contact is linked with this many of its neighbors.
 AT_ONCE = 20_000  # This many contacts are taken at once.
-BEND = 0.1  # Links along which the surface goes on come before those around edges and across gaps,
-STROKE = 0.5  # and those along strokes before others.
-STEP = 2.0  # Successive contacts are linked if they are apart by at most this multiple of neighbors' reach.
+BEND = 0.1  # Links along which the surface goes on come before those around edges and across gaps.
 LEAST_VOTE = 1e-6  # No vote counts less.
-BRIDGES = 8  # Pieces are linked by this many of their nearest contacts.
 OPPOSED = -0.3  # A link contradicts the sides of its contacts if its cosine is less.
 DOUBTED = 0.02  # Not more contacts than this share may contradict their neighbors,
 CONFUSED = 0.05  # and not more than this share may have the other side of a wall among their neighbors.
@@ -119,65 +117,28 @@ def reflection_agreement(points: Array, normals: Array, i: Indices, j: Indices) 
     return row_dot(normals[i], normals[j]) - 2.0 * a * b, np.maximum(np.abs(a), np.abs(b))
 
 
-def oriented(
-    points: Array, planes: Planes, stroke: Indices, known: Array | None = None, up: Array | None = None
-) -> Array:
+def oriented(points: Array, planes: Planes, known: Array | None = None, up: Array | None = None) -> Array:
     """Outward unit normals (n, 3) of points (n, 3) with planes.
 
-    stroke : (n,), the stroke of each
     known : (n, 3), measured unit normals; 0 where there are none
     up : (3,), a hint, a direction to the outer side
 
     Raises ValueError if nothing tells the outer side.
     """
-    links = _bridged(points, planes.normals, *_links(points, planes, stroke))
-    sides, order, ends = _propagated_signs(points, planes.normals, *links)
+    i, j = np.repeat(np.arange(len(points)), LINKS), planes.links.ravel()
+    # Winding numbers choose between the signs of pieces, so any link between these will do.
+    roots = np.unique(connected_pieces(i, j, len(points))[1], return_index=True)[1]
+    i, j = np.append(i, 0 * roots[1:]), np.append(j, roots[1:])
+    sides, order, ends = _propagated_signs(points, planes.normals, i, j)
     normals = sides[:, None] * planes.normals
-    turns, number = _winding_signs(points[order], normals[order], planes.areas[order], ends)
+    is_root = np.isin(order, roots)
+    turns, number = _winding_signs(points[order], normals[order], planes.areas[order], ends, is_root)
     normals[order] *= turns[:, None]
     return normals * _global_sign(normals, known, up, number)
 
 
-def _links(points: Array, planes: Planes, stroke: Indices) -> tuple[Indices, Indices, Array]:
-    """Pairs of neighbors and of successive contacts, (m,) each, and their weights (m,)."""
-    i, j = np.repeat(np.arange(len(points)), LINKS), planes.links.ravel()
-    before = np.flatnonzero(np.diff(stroke) == 0)
-    step = np.linalg.norm(points[before + 1] - points[before], axis=1)
-    before = before[step < STEP * planes.reach[before]]
-    i, j = np.append(i, before), np.append(j, before + 1)
-    factors = np.repeat([1.0, STROKE], [planes.links.size, len(before)])
-    return i, j, factors * _weights(points, planes.normals, i, j)
-
-
-def _weights(points: Array, normals: Array, i: Indices, j: Indices) -> Array:
-    """How uncertain it is which side of one contact follows from another, (m,)."""
-    cosine, bend = reflection_agreement(points, normals, i, j)
-    return 1e-6 + 1.0 - np.abs(cosine) + BEND * bend**2
-
-
-def _bridged(
-    points: Array, normals: Array, i: Indices, j: Indices, weights: Array
-) -> tuple[Indices, Indices, Array]:
-    """The links and those between pieces that they do not connect, from the nearest contacts of these."""
-    from scipy.spatial import cKDTree
-
-    while True:
-        count, piece = connected_pieces(i, j, len(points))
-        if count == 1:
-            return i, j, weights
-        is_mine = piece == np.bincount(piece).argmin()
-        mine, others = np.flatnonzero(is_mine), np.flatnonzero(~is_mine)
-        away, near = cKDTree(points[others]).query(points[mine])
-        some = np.argsort(away, kind="stable")[:BRIDGES]
-        a, b = mine[some], others[near[some]]
-        i, j = np.append(i, a), np.append(j, b)
-        # They come after all links of neighbors, the shortest first.
-        far = 2.0 + away[some] / np.ptp(points, axis=0).max()
-        weights = np.append(weights, far + _weights(points, normals, a, b))
-
-
 def _propagated_signs(
-    points: Array, normals: Array, i: Indices, j: Indices, weights: Array
+    points: Array, normals: Array, i: Indices, j: Indices
 ) -> tuple[Array, Indices, Indices]:
     """The sides (n,), 1 or -1, of normals (n, 3) that follow from the first along the minimal tree of links.
 
@@ -187,7 +148,8 @@ def _propagated_signs(
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import depth_first_order, minimum_spanning_tree
 
-    n, (cosine, _) = len(points), reflection_agreement(points, normals, i, j)
+    n, (cosine, bend) = len(points), reflection_agreement(points, normals, i, j)
+    weights = 1e-6 + 1.0 - np.abs(cosine) + BEND * bend**2
     # Neighbors that have each other as a neighbor count twice, so they are more likely of one wall.
     votes = coo_matrix((cosine / weights, (np.minimum(i, j), np.maximum(i, j))), (n, n)).tocsr()
     votes.sum_duplicates()
@@ -203,7 +165,9 @@ def _propagated_signs(
     return np.array(sides), order, np.arange(n) + np.array(counts)[order]
 
 
-def _winding_signs(points: Array, normals: Array, areas: Array, ends: Indices) -> tuple[Array, float]:
+def _winding_signs(
+    points: Array, normals: Array, areas: Array, ends: Indices, is_root: NDArray[np.bool_]
+) -> tuple[Array, float]:
     """The signs (n,) of contacts that bring winding numbers at contacts nearest to a half; their mean.
 
     On a closed surface the winding number is 1 inside, 0 outside and a half on it (Barill et al. 2018). One
@@ -212,10 +176,11 @@ def _winding_signs(points: Array, normals: Array, areas: Array, ends: Indices) -
 
     points, normals : (n, 3), in the order of the tree
     ends : (n,), where what follows from each contact ends
+    is_root : (n,), which contacts a piece follows from
     """
     n = len(points)
     counts = ends - np.arange(n)
-    starts = np.flatnonzero((counts >= SMALL * n) & (counts <= (1.0 - SMALL) * n) | (counts == n))
+    starts = np.flatnonzero((counts >= SMALL * n) & (counts <= (1.0 - SMALL) * n) | is_root)
     ends, counts = ends[starts], counts[starts]
     probes = np.random.default_rng(0).permutation(n)[:PROBES]
     numbers = np.zeros((len(probes), len(starts)))

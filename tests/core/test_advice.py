@@ -15,7 +15,7 @@ from core.contours.common_point import common_point
 from core.paper import tagc
 from core.verdict import REASONS
 from tests import solids
-from tests.core.atlas.test_measured import ball, cap_rows, rings_of_ball, second
+from tests.core.atlas.test_measured import ball, cap_rows, few_on_box, rings_of_ball, second
 from tests.core.atlas.test_orientation import sphere
 from tests.core.bayes.test_bends import fold
 from tests.core.bayes.test_measured_normals import measured, tilted, touched
@@ -180,10 +180,9 @@ def sides():
     """Strokes over two balls, one in the other, farther apart than half of their distance, and nearer."""
     found = []
     for gap in (0.5, 0.05):
-        strokes = [*sphere(1.0, gap), *sphere(0.8, gap)]
-        points = np.vstack(strokes)
-        planes, stroke = planes_of(points, 0.0), np.repeat(np.arange(len(strokes)), list(map(len, strokes)))
-        found.append(list(doubts_of(points, oriented(points, planes, stroke), planes)))
+        points = np.vstack([*sphere(1.0, gap), *sphere(0.8, gap)])
+        planes = planes_of(points, 0.0)
+        found.append(list(doubts_of(points, oriented(points, planes), planes)))
     return found
 
 
@@ -220,6 +219,10 @@ def confused():
     return found
 
 
+def sparse():
+    return [core.atlas_of([few_on_box(count)]).doubts for count in (800, 2000)]
+
+
 def unfelt():
     return core.atlas_of(cap_rows(), outward=UP).doubts, core.atlas_of(rings_of_ball()).doubts
 
@@ -247,7 +250,7 @@ OF_TOUCHES = {
 }
 OF_OBJECTS = {
     each.__name__.rstrip("_"): each
-    for each in (opposed, ball_, noise, cavity, off_surface, confused, unfelt, cut_short_, rough)
+    for each in (opposed, ball_, noise, cavity, off_surface, confused, sparse, unfelt, cut_short_, rough)
 }
 # What only Blender knows is in tests/addon; goes_on, thin and rays take objects for minutes.
 ELSEWHERE = {"at_edge", "stopped", "out_of_reach", "holes", "off_mesh", "share", "mean_height"}

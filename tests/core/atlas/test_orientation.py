@@ -39,8 +39,7 @@ def box(sizes, gap):
 def outward(strokes, **options):
     points = np.vstack(strokes)
     planes = planes_of(points, 0.0)
-    stroke = np.repeat(np.arange(len(strokes)), [len(some) for some in strokes])
-    normals = oriented(points, planes, stroke, **options)
+    normals = oriented(points, planes, **options)
     return normals, next(doubts_of(points, normals, planes), None)
 
 
