@@ -127,13 +127,14 @@ def found(seed, count, noise=None, errors=None):
     return surface, reconstruct(point, contours, outward=surface.normal)
 
 
-def fold(seed, angle, is_automatic=False, has_normals=True):
-    """A flat top that falls off by this angle, in degrees, at both sides."""
+def fold(seed, angle, is_automatic=False, has_normals=True, k=0.0):
+    """A top of two curvatures k, or a flat one, that falls off by this angle, in degrees, at both sides."""
     rng, slope = np.random.default_rng(seed), math.tan(math.radians(angle))
+    x, y = rng.uniform(-TOP, TOP, 2)
     surface = surfaces.Exact(
-        lambda x, y, z: z + slope * np.maximum(np.abs(x) - TOP, 0.0),
-        lambda p: np.array([slope * np.sign(p[0]) * (abs(p[0]) > TOP), 0.0, 1.0]),
-        *(np.array([*rng.uniform(-TOP, TOP, 2), 0.0]), 0.0, 0.0),
+        lambda x, y, z: z + slope * np.maximum(np.abs(x) - TOP, 0.0) - 0.5 * k * (x * x + y * y),
+        lambda p: np.array([slope * np.sign(p[0]) * (abs(p[0]) > TOP) - k * p[0], -k * p[1], 1.0]),
+        *(np.array([x, y, 0.5 * k * (x * x + y * y)]), 0.0, 0.0),
     )
     turn, extent = rng.uniform(0.0, math.pi), rng.uniform(0.4, 1.0)
     lengths = {"farthest": 1.5} if is_automatic else {"extent": extent}
@@ -166,6 +167,12 @@ ROWS = {
     **{f"folds of {angle} degrees": partial(fold, angle=angle) for angle in (5, 10, 15, 20)},
     **{f"folds of {a} degrees, automatic": partial(fold, angle=a, is_automatic=True) for a in (5, 20)},
     **{f"folds of {a} degrees, no normals": partial(fold, angle=a, has_normals=False) for a in (5, 10, 20)},
+    **{f"curved folds of {a} degrees": partial(fold, angle=a, k=-1.0) for a in (10, 20)},
+    **{
+        f"curved folds of {a} degrees, {kind}": partial(fold, angle=a, k=-1.0, **options)
+        for a in (10, 20)
+        for kind, options in (("automatic", {"is_automatic": True}), ("no normals", {"has_normals": False}))
+    },
     "near the tip of a cone, automatic": cone,
 }
 

@@ -2,14 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How evenly a surface bends along its curves, and so how well these show its curvatures at the point.
 
-Not in the paper. A smooth surface turns a little between all contacts. One of few facets, or with a fold,
-turns at few places: its contacts show a curvature as a rule of integration with as few nodes would, and those
-within a facet share an error. The fit explains such contacts, so its own deviation has neither of both.
+Not in the paper. A smooth surface turns between contacts as it does around them. One of few facets, or with a
+fold, turns at few places: its contacts show a curvature as a rule of integration with as few nodes would, and
+those within a facet share an error. The fit explains such contacts, so its own deviation has neither of both.
 """
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,11 @@ from ..contours.local_geometry import Frame
 # folds or facets (benchmarks.curvatures: folds, tips of cones; a cylinder of 24 facets has more). With 3 and
 # 2, curvatures across folds without normals are off by over five deviations.
 FEW, LEAST = 3.5, 3.0
-EXPLAINED = 5.0  # Turns that are off the median by fewer deviations are explained by noise.
+AROUND = 9  # The steps around one whose median rate of turning is even: two folds are in up to four of them.
+FOLDED = 3.0  # A fold by an angle a bends a patch by up to 3 a / L, if it is next to the point.
+EXPLAINED = 5.0  # Turns that are off even ones by fewer deviations are explained by noise.
 CHORDS = 24  # A curve without normals has at most this number of chords, as a touch has steps.
+SHORT = 0.1  # Steps count as this share of the mean at least: contacts in one place are no fold.
 RIDGE = 1e-12  # It is added to the equations of x^2, xy and y^2, because outliers may leave two curves.
 FLAT = 1e-6  # A curve whose normals turn by less, in radians, turns by rounding.
 
@@ -34,7 +37,7 @@ class Bends(NamedTuple):
     second : (3, c), the second derivatives of x^2, xy and y^2 along each of c curves
     stds : (c,), deviations of the curvatures along these for want of bends, in unit radius
     contacts : how many contacts share a bend, 1 or more
-    folded : the largest mean curvature of a curve of fewer than FEW bends, in unit radius
+    folded : the largest mean curvature beyond even ones of a curve of fewer than FEW bends, in unit radius
     """
 
     second: Array
@@ -59,18 +62,19 @@ def bends_of(contours: Sequence[Contour], frame: Frame, radius: float, noise: fl
 
     Along a curve, the surface turns by d over each step h from contact to contact. With H = sum h these count
     as M = n (sum |d|)^2 / (H sum d^2 / h) bends: n if the turns of the n steps are as their lengths, and one
-    if there is a single one of n even steps. Turns that noise explains count as even. What these show is the
-    mean curvature of the curve or, if that is larger, the curvature of the patch.
+    if there is a single one of n even steps. The turns beyond even ones, which the steps around each show,
+    count likewise: to the share of few bends they make the difference between the curvature of the patch and
+    the even one at the point, or at least their mean.
     """
     kinds = [
         [c for c in contours if (c.normals is None) is bare and len(c.points) > 2] for bare in (False, True)
     ]
     each = [_bends(_turns(kind, frame, radius, noise)) for kind in kinds if kind]
-    x, y, turned, shares, bent, contacts = np.concatenate([np.empty((6, 0)), *each], axis=1)
+    x, y, turned, contacts, shares, mean, most, even = np.concatenate([np.empty((8, 0)), *each], axis=1)
     second = 2.0 * np.array([x * x, x * y, y * y])
-    stds = shares * np.maximum(bent, np.abs(terms @ second))
+    stds = shares * np.clip(np.abs(terms @ second - even), mean, most)
     sharing = float(turned @ contacts) / max(float(turned.sum()), SMALLEST)
-    return Bends(second, stds, max(sharing, 1.0), float(bent[shares > 1.0].max(initial=0.0)))
+    return Bends(second, stds, max(sharing, 1.0), float(mean[shares > 1.0].max(initial=0.0)))
 
 
 class _Turns(NamedTuple):
@@ -78,14 +82,18 @@ class _Turns(NamedTuple):
 
     toward : (c, 2), the direction of each curve in the tangent plane
     curve : (m,), the curve of each turn
-    steps, turns : (m,), the steps h in unit radius, and the turns d in radians
+    middles : (m,), where the turns are along their curves, in unit radius
+    steps, turns : (m,), the steps h in unit radius, and the turns d in radians, above 0 where it is concave
+    stds : (m,), deviations of the turns
     is_felt : whether these are turns of normals, which are the same all over a facet
     """
 
     toward: Array
     curve: NDArray[np.intp]
+    middles: Array
     steps: Array
     turns: Array
+    stds: Array
     is_felt: bool
 
 
@@ -103,25 +111,20 @@ def _turns(contours: Sequence[Contour], frame: Frame, radius: float, noise: floa
         normals = np.concatenate([contour.normals for contour in contours])[order]
         # Products of the largest numbers have to be finite.
         normals = normals / max(float(np.abs(normals).max()), 1e-300) @ frame.axes
-        along, angles = along[order], _angles(normals, toward[curve], curve)
+        along, angles = along[order], _angles(normals, toward[curve])
         stds = np.array([contour.normal_std or 0.0 for contour in contours])[curve]
     else:
         curve, along, angles, stds = _chords(curve, along[order], local[order, 2], noise)
     first, second = _neighbors(curve)
-    curve, steps, turns = curve[second], along[second] - along[first], angles[second] - angles[first]
-    turns = _evened(curve, turns, steps, np.hypot(stds[first], stds[second]))
-    return _Turns(toward, curve, steps, turns, is_felt)
+    middles, steps = 0.5 * (along[second] + along[first]), along[second] - along[first]
+    turns, stds = angles[second] - angles[first], np.hypot(stds[first], stds[second])
+    return _Turns(toward, curve[second], middles, steps, turns, stds, is_felt)
 
 
-def _angles(normals: Array, toward: Array, curve: NDArray[np.intp]) -> Array:
-    """The angles (n,) of normals (n, 3), of any side and length, from that of the point along a curve."""
+def _angles(normals: Array, toward: Array) -> Array:
+    """The angles (n,) of a surface along directions (n, 2), by its normals (n, 3) of any side and length."""
     across = np.copysign(1.0, normals[:, 2]) * np.einsum("ni,ni->n", normals[:, :2], toward)
-    angles = np.arctan2(across, np.abs(normals[:, 2]))
-    # One contact alone that turns another way and back is an outlier.
-    at = (curve[2:] == curve[:-2]).nonzero()[0] + 1
-    before, now, after = angles[at - 1], angles[at], angles[at + 1]
-    angles[at] = np.maximum(np.minimum(before, now), np.minimum(np.maximum(before, now), after))
-    return angles
+    return np.arctan2(-across, np.abs(normals[:, 2]))
 
 
 def _chords(
@@ -137,7 +140,8 @@ def _chords(
     lengths = np.maximum(along[second] - along[first], SMALLEST)
     angles = np.arctan2(heights[second] - heights[first], lengths)
     # Neighbors have a contact in common, so the deviation of a turn is the square root of 6 in place of 4.
-    return curve[second], 0.5 * (along[first] + along[second]), angles, math.sqrt(3.0) * noise / lengths
+    stds = math.sqrt(3.0) * noise / lengths
+    return curve[second], 0.5 * (along[first] + along[second]), angles, stds
 
 
 def _neighbors(curve: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -146,28 +150,56 @@ def _neighbors(curve: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.in
     return second - 1, second
 
 
-def _evened(curve: NDArray[np.intp], turns: Array, steps: Array, stds: Array) -> Array:
-    """The turns (m,) over steps (m,), of which those that their deviations explain follow the mean bend."""
-    if not stds.any():
-        return turns
-    ordered, ends = turns[np.lexsort((turns, curve))], np.bincount(curve).cumsum()
-    middle = ends + np.append(0, ends[:-1])
-    medians = 0.5 * (ordered[(middle - 1) // 2] + ordered[middle // 2])
-    even = np.abs(turns - medians[curve]) <= EXPLAINED * stds
-    means = np.bincount(curve, even * turns) / np.maximum(np.bincount(curve, even * steps), SMALLEST)
-    return np.where(even, means[curve] * steps, turns)
+def _even(of: _Turns) -> Array:
+    """The rates of turning (m,) that steps have around each turn: a fold does not change their median."""
+    at, number = np.arange(len(of.curve)), np.bincount(of.curve)
+    last = (number.cumsum() - 1)[of.curve, None]
+    first = last - number[of.curve, None] + 1
+    # Beyond the ends of a curve its last steps follow in reverse order.
+    around = first + np.abs(at[:, None] + np.arange(AROUND) - AROUND // 2 - first)
+    around = np.maximum(last - np.abs(last - around), first)
+    even: Array = np.median((of.turns / np.maximum(of.steps, SMALLEST))[around], axis=1)
+    return even
+
+
+def _unexplained(of: _Turns, beyond: Array) -> Array:
+    """The turns (m,) beyond even ones, without those that noise explains, alone and with either neighbor."""
+    stds = np.maximum(of.stds, 1e-300)
+    pairs = np.abs(beyond[1:] + beyond[:-1]) * (of.curve[1:] == of.curve[:-1])
+    pairs /= np.maximum(stds[1:], stds[:-1])
+    off = np.maximum.reduce([np.abs(beyond) / stds, np.append(pairs, 0.0), np.append(0.0, pairs)])
+    return np.where(off > EXPLAINED, beyond, 0.0)
+
+
+def _without_outliers(of: _Turns, turns: Array) -> Array:
+    """The turns (m,) of medians of three angles: one contact alone that turns and back is an outlier."""
+    before, after = -turns[:-1], turns[1:]
+    medians = np.maximum(np.minimum(before, after), np.minimum(np.maximum(before, after), 0.0))
+    moved = medians * (of.curve[1:] == of.curve[:-1])
+    return turns + np.append(moved, 0.0) - np.append(0.0, moved)
+
+
+def _counted(of: _Turns, turns: Array) -> tuple[Any, Array]:
+    """The sums (c,) of the absolute turns (m,) of curves, and how many bends (c,) these are."""
+    curve, number = of.curve, np.bincount(of.curve)
+    length = np.maximum(np.bincount(curve, of.steps), SMALLEST)
+    turned = np.bincount(curve, np.abs(turns))
+    squares = np.bincount(curve, turns**2 / np.maximum(of.steps, (SHORT * length / number)[curve]))
+    bends: Array = np.where(turned > FLAT, number * turned**2 / np.maximum(length * squares, 1e-300), number)
+    return turned, bends
 
 
 def _bends(of: _Turns) -> Array:
-    """What c curves show, (6, c): x and y, the sum of turns, a share, the mean curvature, contacts in a bend.
-
-    The share is that to which the bends show a curvature.
+    """What c curves show, (8, c): x and y; the sum of turns and the contacts in a bend; and, for turns beyond
+    even ones, the share of few bends, their mean and the most they bend a patch; the even curvature.
     """
-    curve, number = of.curve, np.bincount(of.curve)
-    length, turned = np.maximum(np.bincount(curve, of.steps), SMALLEST), np.bincount(curve, np.abs(of.turns))
-    squares = np.bincount(curve, of.turns**2 / np.maximum(of.steps, (1e-3 * length / number)[curve]))
-    turned[turned <= FLAT] = 0.0
-    bends = np.where(turned > 0.0, number * turned**2 / np.maximum(length * squares, 1e-300), number)
-    shares, bent = (FEW / np.maximum(bends, LEAST)) ** 3, np.abs(np.bincount(curve, of.turns)) / length
+    curve, number, even = of.curve, np.bincount(of.curve), _even(of)
+    around = even * of.steps
+    beyond = _unexplained(of, of.turns - around)
+    turned, bends = _counted(of, around + _unexplained(of, _without_outliers(of, of.turns) - around))
     contacts = np.maximum(number / bends, 1.0) if of.is_felt else np.ones(len(bends))
-    return np.array([*of.toward.T, turned, shares * (turned > 0.0), bent, contacts])
+    most, few = _counted(of, beyond)
+    mean = np.abs(np.bincount(curve, beyond)) / np.maximum(np.bincount(curve, of.steps), SMALLEST)
+    at_point = np.lexsort((np.abs(of.middles), curve))[number.cumsum() - number]
+    shares = (FEW / np.maximum(few, LEAST)) ** 3
+    return np.array([*of.toward.T, turned, contacts, shares, mean, FOLDED * most, even[at_point]])

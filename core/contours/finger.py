@@ -35,6 +35,17 @@ class Surface(Protocol):
         """The first point within `distance` along the unit `direction` and the unit normal there, or None."""
 
 
+class NoContactError(ValueError):
+    """Rays that are to meet the surface next to a contact do not."""
+
+
+def checked(surface: Surface) -> Surface:
+    """The surface. Raises ValueError if it is nothing that can be touched."""
+    if not callable(getattr(surface, "ray_cast", None)):
+        raise ValueError(f"surface: expected an object with the method ray_cast, got {shown(surface)}")
+    return surface
+
+
 # A contact: its place and the surface normal, both in the sampling plane as complex numbers, and both in
 # space.
 _PlaneContact = tuple[complex, complex, Vector, Vector]
@@ -55,7 +66,7 @@ def first_contact(
             _, _, found, up = contact
             side = math.copysign(1.0, dot(up, n))
             return found, scaled(up, side), side
-    raise ValueError(
+    raise NoContactError(
         f"point: expected one on the surface, got one with no surface within {reach:.3g} along the normal: "
         "move it onto the surface, or away from a corner"
     )
@@ -149,7 +160,7 @@ def _next_contact(cast: _Cast, at: complex, ahead: complex, up: complex, step: f
             return None
         chord = abs(contact[0] - at)
         if not 0.5 * step < chord < 2.0 * step:
-            raise ValueError(
+            raise NoContactError(
                 f"surface: expected hits on the rays, some {step:g} apart, got one {chord:g} from the last"
             )
         if abs(chord - step) <= 1e-3 * step:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, list_of, number, shown, unit_vector
 from .contour import EXTENT, Contour, SamplingPlane, Vector, dot, tangent_of, vector_of
-from .finger import LEAST_IN_PLANE, Surface, contacts, first_contact, section
+from .finger import LEAST_IN_PLANE, Surface, checked, contacts, first_contact, section
 
 MOST_IN_HALF = 10_000  # Half a contour has at most this many contacts.
 
@@ -64,7 +64,7 @@ def tracker(
     planes = list_of("planes", planes, SamplingPlane)
     noise, generator = number("noise", noise, least=0.0), generator_of(rng)
     e1 = tangent_of(n, tangent)
-    start, up, side = first_contact(surface, vector_of(p), n, e1, step)
+    start, up, side = first_contact(checked(surface), vector_of(p), n, e1, step)
     curves = []
     for plane in planes:
         t, u, across = plane.axes_of_unit_vectors(n, e1)

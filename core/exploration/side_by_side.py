@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, unit_vector
 from ..contours.contour import EXTENT, Contour, SamplingPlane, Vector, along, scaled, vector_of
-from ..contours.finger import SAME_SHEET_COSINE, Surface, contact_of
+from ..contours.finger import SAME_SHEET_COSINE, NoContactError, Surface, checked, contact_of
 from ..contours.tracking import generator_of, track, tracker
 from ..reconstruction.from_contours import fitted
 from ..reconstruction.options import FitOptions
@@ -42,7 +42,7 @@ def exploring_many(
     p = finite_array("points", points, (None, 3), LARGEST)
     up = finite_array("outward", outward, (len(p), 3))
     up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
-    generator, tangent = generator_of(options.rng), options.tangent
+    generator, tangent, surface = generator_of(options.rng), options.tangent, checked(surface)
     # For a whole object half curves end where another sheet begins, and all others at no angle.
     cosine = SAME_SHEET_COSINE if options.largest_std else -1.0
 
@@ -85,7 +85,7 @@ def _farthest(
         try:
             contours = (contour for plane in planes for contour in track_along([plane], **lengths))
             return not any(EXTENT in (contour.stops or ()) for contour in contours)
-        except ValueError:
+        except NoContactError:
             return True
 
     # Lengths that are far shorter than the coordinates are lost to rounding.

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, many
 from ..bayes.bends import Bends, bends_of
-from ..bayes.joint_fit import OUTLYING, posterior_of
+from ..bayes.joint_fit import MISFIT, OUTLYING, posterior_of
 from ..bayes.near_point import curvature_contradiction
 from ..bayes.normals import contradiction, measured_normals, scatter
 from ..bayes.other_curves import ENOUGH, contradicting_curve
@@ -256,7 +256,7 @@ class Reconstruction(Judged):
         """How unevenly the surface bends along the curves."""
         fitted = float(self.posterior.noise)
         noises = [fitted if c.noise is None else c.noise / self.radius for c in self.contours]
-        contours, most = self.contours, OUTLYING * fitted * self.radius
+        contours, most = self.contours, OUTLYING * max(fitted, MISFIT) * self.radius
         if self._departures.max() > most:
             contours = tuple(self._explained(c, most) if c.normals is None else c for c in contours)
         noise, terms = max(noises, default=0.0), self.posterior.polynomial[2:FREE]

@@ -10,7 +10,7 @@ import pytest
 import surfaces
 
 import core
-from core.bayes.bends import FEW, LEAST, bends_of
+from core.bayes.bends import bends_of
 
 TOP = 0.2
 
@@ -27,6 +27,18 @@ def fold(angle, x=0.0):
     )
 
 
+def curved_fold(k1, k2, angle, at):
+    """A paraboloid of these curvatures that falls off by this angle more, in degrees, beyond x = at."""
+    slope = math.tan(math.radians(angle))
+    return surfaces.Exact(
+        lambda x, y, z: z - 0.5 * (k1 * x * x + k2 * y * y) + slope * np.maximum(x - at, 0.0),
+        lambda p: np.array([-k1 * p[0] + slope * (p[0] > at), -k2 * p[1], 1.0]),
+        np.zeros(3),
+        k1,
+        k2,
+    )
+
+
 def touches(angle, count, seed, **lengths):
     """Results at points of a flat top, with planes turned at random."""
     rng = np.random.default_rng(seed)
@@ -36,16 +48,29 @@ def touches(angle, count, seed, **lengths):
         yield core.explore(s, s.point, s.normal, planes, **lengths).result
 
 
-def is_silent(r):
-    """Whether a sure touch is off by over five deviations and 3 % of 1 / L, where both curvatures are 0."""
-    each = ((abs(r.k1), r.k1_std), (abs(r.k2), r.k2_std))
-    return r.status == "ok" and any(k > 5.0 * std and k * r.radius > 0.03 for k, std in each)
+def is_silent(r, k1=0.0, k2=0.0):
+    """Whether a sure touch is off these curvatures by over five deviations and 3 % of 1 / L."""
+    each = ((abs(r.k1 - k1), r.k1_std), (abs(r.k2 - k2), r.k2_std))
+    return r.status == "ok" and any(off > 5.0 * std and off * r.radius > 0.03 for off, std in each)
 
 
 @pytest.mark.parametrize("extent", [0.3, 0.6, 1.0])
 @pytest.mark.parametrize("angle", [5, 10, 15, 20])
 def test_no_touch_across_folds_is_sure_of_their_curvature(angle, extent):
     assert not any(is_silent(r) for r in touches(angle, 4, 0, extent=extent))
+
+
+@pytest.mark.parametrize("lengths", [{"farthest": 1.0}, {"extent": 1.0}])
+@pytest.mark.parametrize("angle", [5, 10, 20, 30])
+@pytest.mark.parametrize(("k1", "k2"), [(-0.3, -0.3), (-1.0, -1.0), (-1.0, 1.0), (-1.0, 0.0)])
+def test_no_touch_across_a_fold_of_a_curved_surface_is_sure_of_its_curvature(k1, k2, angle, lengths):
+    """With normals and without: the surface itself turns between all contacts, and once more at the fold."""
+    for at in (0.1, 0.2, 0.45):
+        s, planes = curved_fold(k1, k2, angle, at), surfaces.planes((10, 70, 130))
+        found = core.explore(s, s.point, s.normal, planes, **lengths)
+        bare = [replace(contour, normals=None) for contour in found.contours]
+        for r in (found.result, core.reconstruct(s.point, bare, outward=s.normal)):
+            assert not is_silent(r, k1, k2)
 
 
 @pytest.mark.parametrize("turn", [0, 10, 20, 30])
@@ -68,6 +93,15 @@ def test_without_normals_the_deviation_contains_the_curvature_of_folds(angle):
     assert sure > 0
 
 
+@pytest.mark.parametrize("turn", [0, 15, 30, 45])
+def test_two_folds_without_normals_next_to_the_point_are_no_even_curvature(turn):
+    """Each fold is a bend of two chords, and the four are among the seven nearest to the point."""
+    s, planes = fold(25), surfaces.planes(turn + np.array([0.0, 60.0, 120.0]))
+    contours = core.explore(s, s.point, s.normal, planes, extent=10.0 / 6.0).result.contours
+    bare = [replace(contour, normals=None) for contour in contours]
+    assert not is_silent(core.reconstruct(s.point, bare, outward=s.normal))
+
+
 def test_a_touch_across_folds_names_them():
     (r,) = touches(20, 1, 2, extent=1.0)
     assert r.message.startswith("The surface turns at three places or fewer along a curve")
@@ -81,10 +115,21 @@ def contour(angles, steps):
     return core.Contour(np.column_stack([x - x.mean(), np.zeros((len(x), 2))]), normals=normals)
 
 
-def bends(given):
+def bends(given, noise=0.0, k=0.0):
+    """The bends of contours along x and of the same along y, for a patch of this curvature in unit radius."""
     frame = core.Frame(np.zeros(3), np.eye(3))
-    across = [core.Contour(c.points[:, [1, 0, 2]], normals=c.normals[:, [1, 0, 2]]) for c in given]
-    return bends_of([*given, *across], frame, 0.5 * np.ptp(given[0].points[:, 0]), 0.0, np.zeros(3))
+    turned = [1, 0, 2]
+    across = [
+        core.Contour(c.points[:, turned], normals=None if c.normals is None else c.normals[:, turned])
+        for c in given
+    ]
+    return bends_of(
+        [*given, *across],
+        frame,
+        0.5 * np.ptp(given[0].points[:, 0]),
+        noise,
+        np.array([0.5 * k, 0.0, 0.5 * k]),
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -103,8 +148,64 @@ def test_a_single_fold_is_one_bend_whatever_length_and_side_normals_have(scale):
     turned = replace(turned, normals=scale * turned.normals)
     assert found.folded == pytest.approx(0.1)  # 0.2 radians over 2 L
     assert bends([turned]).covariance == pytest.approx(found.covariance)
-    wanted = (FEW / LEAST) ** 3 * 0.1
+    wanted = (3.5 / 3.0) ** 3 * 0.1
     assert 2.0 * math.sqrt(found.covariance[0, 0]) == pytest.approx(wanted, rel=1e-6)
+
+
+@pytest.mark.parametrize("wide", [1, 2, 3])
+def test_a_fold_of_a_curve_makes_uncertain_what_the_patch_bends_more_than_the_rest(wide):
+    """The curve bends by -1 in unit radius, and the patch by -1.3. The fold is over up to three steps."""
+    x = np.linspace(-1.2, 1.2, 25)
+    angles = x / 1.2 + 0.2 * np.clip((np.arange(25) - 9) / wide, 0.0, 1.0)
+    found = bends([contour(angles, np.diff(x))], k=-1.3)
+    assert found.stds == pytest.approx([(3.5 / 3.0) ** 3 * 0.3] * 2, rel=1e-6)
+    assert found.folded == pytest.approx(0.1)
+    slight = bends([contour(x / 1.2 + 1e-3 * (x > 0.35), np.diff(x))], k=-1.3)
+    assert slight.stds == pytest.approx([(3.5 / 3.0) ** 3 * 3e-3] * 2, rel=1e-6)  # 3 a / L
+
+
+@pytest.mark.parametrize("has_normals", [True, False])
+def test_a_curvature_that_changes_evenly_is_no_fold(has_normals):
+    """The curvature of a cubic, and that of a sextic, which has a maximum within the curve."""
+    x = np.linspace(-1.0, 1.0, 25)
+    for slope, height in ((x**2 + x, x**3 / 3.0 + x**2 / 2.0), (x + x**5, x**2 / 2.0 + x**6 / 6.0)):
+        given = contour(-np.arctan(slope), np.diff(x))
+        points = np.column_stack([x, np.zeros(25), height])
+        given = replace(given, points=points, normals=given.normals if has_normals else None)
+        assert bends([given], k=1.1).stds.max() < 0.05
+
+
+def noisy_fold(angle, seed, noise=1e-3):
+    """A curve of 97 contacts with noise and without normals that has a curvature of -1 and one fold."""
+    x = np.linspace(-1.0, 1.0, 97)
+    heights = -0.5 * x**2 - math.tan(math.radians(angle)) * np.maximum(x - 0.3, 0.0)
+    heights += np.random.default_rng(seed).normal(0.0, noise, 97)
+    return core.Contour(np.column_stack([x, np.zeros(97), heights]))
+
+
+def test_noise_alone_bends_no_curve_and_a_fold_in_it_does():
+    smooth = [bends([noisy_fold(0.0, seed)], 1e-3, -1.0).stds.max() for seed in range(40)]
+    assert (np.array(smooth) > 0.01).sum() <= 1
+    folded = [bends([noisy_fold(20.0, seed)], 1e-3, -1.2).stds.max() for seed in range(40)]
+    assert (np.array(folded) > 0.1).sum() >= 38
+
+
+def test_rounding_is_no_bend_and_contacts_in_one_place_are_no_fold():
+    level = contour(np.where(np.arange(25) < 12, 0.0, 1e-9), np.full(24, 0.1))
+    assert bends([level]).contacts == 1.0
+    steps = np.full(24, 0.1)
+    steps[5] = 1e-12
+    assert bends([contour(0.3 * np.linspace(-1.0, 1.0, 25), steps)]).contacts < 1.6
+
+
+def test_outlying_contacts_without_normals_are_no_folds():
+    s, rng = surfaces.sphere(25.0), np.random.default_rng(1)
+    contours = s.track(surfaces.planes((0, 60, 120)), noise=0.0)
+    for contour in contours:
+        contour.points[rng.integers(1, 8)] += 1.0 * s.normal
+    r = core.reconstruct(s.point, [core.Contour(c.points) for c in contours], outward=s.normal)
+    assert r.status == "ok"
+    assert r.k1_std < 0.002
 
 
 def test_one_normal_that_is_wrong_is_no_bend():
@@ -112,7 +213,7 @@ def test_one_normal_that_is_wrong_is_no_bend():
     wrong = angles.copy()
     wrong[7] += 0.5
     found = bends([contour(wrong, np.full(24, 0.1))])
-    assert found.folded == 0.0
+    assert found.folded == pytest.approx(0.0, abs=1e-12)
     assert found.contacts < 1.2
 
 

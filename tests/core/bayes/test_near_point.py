@@ -65,3 +65,14 @@ def test_few_contacts_cannot_contradict():
     near = r.contacts[:3] / r.radius
     assert curvature_contradiction(near, r.posterior, r.curvature_covariance) == 0.0
     assert curvature_contradiction(near[:0], r.posterior, r.curvature_covariance) == 0.0
+
+
+def test_contacts_are_enough_from_one_and_a_half_times_what_a_quartic_shows_of_them():
+    """These show all 14 terms of a quartic, because the normal is not in the planes of their curves."""
+    surface, planes = cone(0.26, 0.5), surfaces.planes((30, 90, 150))
+    r = core.explore(surface, surface.point, surface.normal, planes, extent=2.0, step=0.125).result
+    contacts = r.contacts / r.radius
+    near = contacts[np.hypot(contacts[:, 0], contacts[:, 1]) < 0.59]
+    for count, is_enough in ((20, False), (21, True)):
+        some = near[np.linspace(0, len(near) - 1, count).round().astype(int)]
+        assert (curvature_contradiction(some, r.posterior, r.curvature_covariance) > 0.0) is is_enough

@@ -4,6 +4,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -657,3 +658,38 @@ def test_where_a_deviation_is_requested_half_curves_that_begin_short_grow(high, 
     found = explore(waves, largest_std=std)
     assert found.extent > extent
     assert found.result.mean_height_std < std
+
+
+@pytest.mark.parametrize("farthest", [None, 10.0])
+def test_the_error_of_a_surface_itself_is_raised(farthest):
+    class Broken:
+        def ray_cast(self, origin, direction, distance):
+            raise ValueError("the sensor is off")
+
+    with pytest.raises(ValueError, match="the sensor is off"):
+        core.explore(Broken(), (0.0, 0.0, 0.0), UP, farthest=farthest)
+
+
+@pytest.mark.parametrize("lengths", [{"extent": 1.0, "step": 0.1}, {"extent": 1.0}, {}])
+def test_what_has_no_rays_is_refused_in_a_sentence(lengths):
+    touch = core.track if "step" in lengths else core.explore
+    with pytest.raises(ValueError, match="surface: expected an object with the method ray_cast, got <object"):
+        touch(object(), (0.0, 0.0, 0.0), UP, PLANES, **lengths)
+
+
+def test_a_plane_is_added_if_it_takes_a_tenth_off_the_deviation():
+    s = surfaces.torus(40, 20, 0.6)
+    given = {"extent": 6.0, "step": 0.5, "tolerance": 0.0, "most_planes": 12, "noise": 0.05, "rng": 0}
+    found = core.explore(s, s.point, s.normal, **given)
+    assert 3 < len(found.planes) < 12
+    outward, tangent = s.normal, core.SamplingPlane(0.0).axes(s.normal, None)[:, 0]
+    before = core.reconstruct(s.point, found.contours[:-1], outward=outward)
+    assert core.suggest_plane(before, outward, tangent)[1] <= 0.9 * found.stds[-2]
+    assert core.suggest_plane(found.result, outward, tangent)[1] > 0.9 * found.stds[-1]
+
+
+def test_the_length_at_which_curves_end_is_found_to_a_64th():
+    ball = surfaces.sphere(20.0)
+    given = ball, tuple(ball.point), tuple(ball.normal)
+    found = side_by_side._farthest(*given, PLANES, partial(core.track, *given))
+    assert 1.0 <= found / (20.0 * math.radians(75.0)) * 1.002 < 1.0 + 1.0 / 64.0

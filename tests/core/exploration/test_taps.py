@@ -13,7 +13,7 @@ import surfaces
 import core
 from core.exploration import extent
 from core.exploration.extent import TAPS_OFF
-from core.exploration.taps import places, tapped
+from core.exploration.taps import layer_height, places, tapped
 from core.reconstruction.status import DOUBTFUL_GAP, Taps
 
 FARTHEST = 30.0
@@ -274,3 +274,17 @@ def test_taps_go_with_the_result():
     del old["taps"]
     assert core.from_dict(old).taps is None
     assert replace(r, taps=None).status == "ok"
+
+
+@pytest.mark.parametrize("apart", [0.005, 0.0005])
+def test_a_layer_closely_below_another_is_met(apart):
+    """A ray goes on a hair's breadth, a ten thousandth of its reach, below the layer that faces down."""
+
+    class Layers:
+        def ray_cast(self, origin, direction, distance):
+            for height, up in ((apart, -1.0), (0.0, 1.0)):
+                if 0.0 <= origin[2] - height <= distance:
+                    return (origin[0], origin[1], height), (0.0, 0.0, up)
+            return None
+
+    assert layer_height(Layers(), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0) == pytest.approx(0.0, abs=1e-12)

@@ -36,6 +36,7 @@ from core import (
     to_dict,
     track,
 )
+from core.contours.finger import NoContactError
 
 NAMES = (
     "azimuth|contours|contours_list|degree|extent|farthest|method|noise|normal|normal_std|normals|outward|plane_normal|planes|point|"
@@ -104,7 +105,7 @@ def is_sentence(error):
         )
         return known and len(words) < 400 and "nan" not in words
     return (
-        type(error) is ValueError
+        type(error) in (ValueError, NoContactError)
         and re.match(rf"({NAMES})(\[\d+\])?: expected ", words)
         and (", got " in words and "\n" not in words and len(words) < 300)
     ) or words == ENDLESS
