@@ -7,8 +7,7 @@ It touches meshes at random points (seeded, by area). The error is that of a pri
 of the larger one.
 The curvatures of balls, tori, cylinders and cones of Blender's Add menu are known exactly, and those of balls
 that are scaled along their axis. Suzanne with one to three levels of subdivision is compared with five
-levels. These are touched with an automatic extent. Scans are touched with a 32nd of their size, and compared
-with patches three times as long; without the folder of scans their rows are left out.
+levels. All are touched with an automatic extent.
 
 A Markdown table counts, for all objects, patches that are good and those that are about the facets. Of the
 good ones it counts those that are off by over 1/4, and those of these that are beyond two stated deviations:
@@ -33,7 +32,7 @@ import numpy as np
 from tests.surfaces import ellipsoid
 from tools import blender
 
-from . import SCANS_FOLDER, machine, table
+from . import machine, table
 from .paper import AZIMUTHS
 
 POINTS = 60
@@ -42,13 +41,6 @@ WRONG, RIGHT = 0.25, 0.15  # Good patches with larger errors may be wrong, those
 WITHIN, KNOWN = 2.0, 0.1  # Deviations, and a share of 1 / L, within which a curvature is right.
 OF_MODELS, SEED, MOST_FACES = 12, 7, 600_000  # Points of a model, and faces of it when it is subdivided.
 FINEST, AGREE = 5, 0.15  # Suzanne's curvatures are those of these levels where two extents agree to this.
-SCANS = {
-    "pear": "pear.ply",
-    "lemon": "lemon.ply",
-    "Eros": "asteroid_eros.ply",
-    "femur": "bone_femur_proximal.stl",
-}
-EXTENT, LONGER = 1.0 / 32.0, 3.0  # Of scans, in sizes, and of the patches with which they are compared.
 
 
 def shapes(add):
@@ -109,15 +101,15 @@ def suzanne(bpy, levels):
     return bpy.context.object
 
 
-def objects(bpy, add_on, touch):
-    """(name, object, extent, a function of a place and a touch there) of all objects.
+def objects(bpy, touch):
+    """(name, object, a function of a place and a touch there) of all objects.
 
     The function has the principal curvatures of the shape, or None where these are not known.
     """
     for name, add, exact in (*shapes(bpy.ops.mesh), *scaled_balls(bpy)):
         bpy.ops.wm.read_homefile(use_empty=True)
         add()
-        yield name, bpy.context.object, 0.0, lambda place, _, exact=exact: exact(place)
+        yield name, bpy.context.object, lambda place, _, exact=exact: exact(place)
     for levels in (1, 2, 3):
         bpy.ops.wm.read_homefile(use_empty=True)
         fine, obj = suzanne(bpy, FINEST), suzanne(bpy, levels)
@@ -127,17 +119,7 @@ def objects(bpy, add_on, touch):
             if whole and half and off_by(whole, curvatures(half)) < AGREE:
                 return curvatures(half)
 
-        yield f"Suzanne, levels {levels}", obj, 0.0, agreed
-    for name, file in SCANS.items() if SCANS_FOLDER.is_dir() else ():
-        add_on.files.mesh_file.open_file(SCANS_FOLDER / file)
-        obj = bpy.context.scene.objects[0]
-        extent = EXTENT * max(obj.dimensions)
-
-        def of_longer(place, _, obj=obj, extent=extent):
-            longer = touch(obj, place, LONGER * extent)
-            return longer and curvatures(longer)
-
-        yield name, obj, extent, of_longer
+        yield f"Suzanne, levels {levels}", obj, agreed
 
 
 def places(obj, depsgraph, count=POINTS, seed=0):
@@ -184,7 +166,7 @@ def main():
     add_on = extension.tactile_addon
     fit = {"seed": 0, "method": "bayes", "degree": "auto", "weight": None, "solver": "fast"}
 
-    def touch(obj, place, extent):
+    def touch(obj, place, extent=0.0):
         lengths = {"extent": extent, "step": 0.0, "noise": 0.0}
         depsgraph = bpy.context.evaluated_depsgraph_get()
         try:
@@ -198,9 +180,9 @@ def main():
         return
     errors = defaultdict(list)  # By object: (verdict, error, whether it is wrong) of each patch.
     with blender.quiet():
-        for name, obj, extent, true_curvatures in objects(bpy, add_on, touch):
+        for name, obj, true_curvatures in objects(bpy, touch):
             for place in places(obj, bpy.context.evaluated_depsgraph_get()):
-                found = touch(obj, place, extent)
+                found = touch(obj, place)
                 true = found and true_curvatures(place, found)
                 if true and any(true):
                     error = off_by(found, true)
@@ -250,7 +232,7 @@ def print_models(bpy, paths, touch):
             obj, fine = opened(bpy, path)
             counts = np.zeros(6, dtype=int)
             for place in places(obj, bpy.context.evaluated_depsgraph_get(), OF_MODELS, SEED):
-                found = touch(obj, place, 0.0)
+                found = touch(obj, place)
                 if found is None:
                     continue
                 fitted = (touch(fine, place, share * found.result.radius) for share in (1.0, 0.5))

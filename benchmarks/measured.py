@@ -31,7 +31,7 @@ import numpy as np
 
 import core
 from core.atlas.orientation import doubts_of, oriented, planes_of
-from core.triangles import normalized, triangle_cross
+from core.triangles import normalized
 from tools import blender
 
 from . import machine, table
@@ -48,6 +48,7 @@ from .atlas_shapes import (
     square_ring,
     tee,
 )
+from .whole import spread
 
 NOISE = 0.0005
 PLACES = 1000  # This many places are judged around each scan, and as many above felt area.
@@ -306,29 +307,14 @@ def print_features(only, first):
     table([*head, "elsewhere", "patches", "s"], rows)
 
 
-def spread(thing, count, rng):
-    """Contacts (n, 3) all over an object and normals: each is the farthest from those before of ten tried."""
-    across = triangle_cross(thing.vertices[thing.triangles])
-    areas = np.linalg.norm(across, axis=1)
-    face = rng.choice(len(areas), (count, 10), p=areas / areas.sum())
-    tried = np.einsum(
-        "nkc,nkcd->nkd", rng.dirichlet(np.ones(3), face.shape), thing.vertices[thing.triangles][face]
-    )
-    best = np.zeros(count, dtype=int)
-    for i in range(1, count):
-        points = tried[np.arange(i), best[:i]]
-        best[i] = np.linalg.norm(tried[i][:, None] - points, axis=2).min(axis=1).argmax()
-    every = np.arange(count)
-    return tried[every, best], normalized(across[face[every, best]])
-
-
 def print_even(only, first):
     rows = []
     for name, count in product((name for name in OBJECTS if only in name), EVEN):
         with blender.quiet():
             thing = Made(name, *OBJECTS[name]())
-        points, normals = spread(thing, count, np.random.default_rng(first))
-        object_points = spread(thing, CHECKED, np.random.default_rng(first + 1))[0]
+        rng, mesh = np.random.default_rng(first), (thing.vertices, thing.triangles)
+        object_points, tried = core.scattered(*mesh, CHECKED, rng)[0], core.scattered(*mesh, 10 * count, rng)
+        points, normals = (values[spread(tried[0], count)] for values in tried)
         for some in (normals, None):
             try:
                 atlas = core.atlas_of([core.Contour(points, normals=some)])
