@@ -25,8 +25,8 @@ from .lattice import Lattice, lattice_at_level, turned
 # python -m benchmarks.atlas --shapes judges these.
 BAND = 1.5  # Patches count within this many cells of the indicator, or pitches, of a point.
 CROSSED = 0.5  # A plane that passes an edge by this many pitches counts as well, if no other crosses it.
-# Walls that meet go on to this share of their rims, which are a little short at corners. With 1 a cube along
-CORNER = 1.02  # the axes has corners cut by eight tolerances, with 1.04 brackets have some cut by ten.
+# Walls that meet go on to this share of their rims, which are a little short at corners: with 1 and with
+CORNER = 1.02  # 1.06 more corners of boxes and brackets are cut by over a tolerance.
 SLACK = 1.0  # A vertex is at most this many pitches outside of its cell: the tip of a crease may be there.
 SOFT = 0.07  # A vertex does not move along planes that turn less, as mean squares of their sines: with .02 a
 # surface without creases has folds, as around Suzanne's eyes (some three times as many).
