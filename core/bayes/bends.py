@@ -171,6 +171,17 @@ def _unexplained(of: _Turns, beyond: Array) -> Array:
     return np.where(off > EXPLAINED, beyond, 0.0)
 
 
+def _with_neighbors(of: _Turns, turns: Array, beyond: Array) -> Array:
+    """Those turns (m,) beyond even ones that noise does not explain, `beyond` (m,), and those beside them.
+
+    A contact that is off turns chords one way, twice as far back, and again, which is no bend; noise may
+    explain the lesser ones.
+    """
+    near, joined = beyond != 0.0, of.curve[1:] == of.curve[:-1]
+    near = near | np.append(near[1:] & joined, False) | np.append(False, near[:-1] & joined)
+    return np.where(near, turns, 0.0)
+
+
 def _without_outliers(of: _Turns, turns: Array) -> Array:
     """The turns (m,) of medians of three angles: one contact alone that turns and back is an outlier."""
     before, after = -turns[:-1], turns[1:]
@@ -199,7 +210,8 @@ def _bends(of: _Turns) -> Array:
     turned, bends = _counted(of, around + _unexplained(of, _without_outliers(of, of.turns) - around))
     contacts = np.maximum(number / bends, 1.0) if of.is_felt else np.ones(len(bends))
     most, few = _counted(of, beyond)
-    mean = np.abs(np.bincount(curve, beyond)) / np.maximum(np.bincount(curve, of.steps), SMALLEST)
+    net = np.bincount(curve, _with_neighbors(of, of.turns - around, beyond))
+    mean = np.abs(net) / np.maximum(np.bincount(curve, of.steps), SMALLEST)
     at_point = np.lexsort((np.abs(of.middles), curve))[number.cumsum() - number]
     shares = (FEW / np.maximum(few, LEAST)) ** 3
     return np.array([*of.toward.T, turned, contacts, shares, mean, FOLDED * most, even[at_point]])

@@ -217,6 +217,27 @@ def test_one_normal_that_is_wrong_is_no_bend():
     assert found.contacts < 1.2
 
 
+@pytest.mark.parametrize("off", [0.014, 0.02, 0.04])
+def test_a_contact_that_noise_explains_in_part_is_no_fold(off):
+    """It turns chords one way, twice as far back, and again; noise explains the lesser ones."""
+    x = np.linspace(-1.0, 1.0, 25)
+    heights = -0.5 * x**2 + off * (np.arange(25) == 15)
+    found = bends([core.Contour(np.column_stack([x, np.zeros(25), heights]))], 0.002, -1.0)
+    assert found.folded < 0.02
+    assert found.stds.max() < 0.1
+
+
+@pytest.mark.parametrize("turn", [0.2, -0.2])
+@pytest.mark.parametrize(("first", "second"), [(1, 24), (24, 1)])
+def test_turns_of_two_curves_are_no_outlier(first, second, turn):
+    """One turns at its end, and the next back at its start."""
+    one, other = (
+        contour(angle * (np.arange(25) >= at), np.full(24, 0.1))
+        for angle, at in ((turn, first), (-turn, second))
+    )
+    assert bends([one, other]).contacts == pytest.approx(bends([one]).contacts)
+
+
 @pytest.mark.parametrize("sections", [24, 32, 64])
 def test_facets_around_a_cylinder_are_bends_enough(sections):
     angle = np.arange(sections) * 2.0 * math.pi / sections
