@@ -119,7 +119,7 @@ def _judged(
     off_surface = partial(_off_surface, atlas, noise, most)
     distances, far, is_turned = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
     off_planes = partial(_off_planes, atlas.charts, cKDTree(contacts.points), contacts)
-    (between,) = yield from chunked(off_planes, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
+    between, alike = yield from chunked(off_planes, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
     worst, widest = _largest_cluster(far, distances, contacts.links), np.argsort(-between, kind="stable")
     limit, fit_noise = MOST_OFF * float(np.ptp(contacts.points, axis=0).max()), 0.0 if given else noise
     off = _doubts_of_contacts(contacts, distances, far, worst, is_turned, limit)
@@ -127,7 +127,7 @@ def _judged(
     sparse = [Doubt("sparse", between[i], limit, (place_text(mesh.vertices[[i]]),)) for i in gaps[:1]]
     # A finger may miss the first of these, so others follow.
     places = [(contacts.points[i], contacts.normals[i]) for i in worst[: len(off)]]
-    places += [(mesh.vertices[i], mesh.normals[i]) for i in gaps]
+    places += [(mesh.vertices[i], contacts.normals[alike[i]]) for i in gaps]
     return replace(
         atlas,
         contradictions=(*doubts, *_doubts_of_surface(atlas, fit_noise, most), *off, *sparse),
@@ -264,8 +264,8 @@ def _off_surface(
 
 def _off_planes(
     charts: Charts, tree: Any, contacts: MeasuredContacts, points: Array, normals: Array
-) -> tuple[Array]:
-    """How far places (n, 3) of the surface are off the planes of the nearest contacts, (n,).
+) -> tuple[Array, Indices]:
+    """How far places (n, 3) of the surface are off the planes of nearest contacts, and which these are, (n,).
 
     Of contacts nearby it is one that faces alike, if there is any. It is 0 on patches. Between them the
     surface may be anywhere up to these planes: an edge that no contact is near is cut off by half of the
@@ -275,7 +275,7 @@ def _off_planes(
     is_alike = np.einsum("nki,ni->nk", contacts.normals[near], normals) > AGREE
     nearest = near[np.arange(len(points)), is_alike.argmax(axis=1)]
     off = np.abs(row_dot(contacts.normals[nearest], points - contacts.points[nearest]))
-    return (np.where(covered(charts, points, normals), 0.0, off),)
+    return np.where(covered(charts, points, normals), 0.0, off), nearest
 
 
 def _doubts_of_surface(atlas: Atlas, noise: float, most: float) -> Iterator[Doubt]:

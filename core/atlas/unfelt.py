@@ -31,13 +31,15 @@ def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[RimPlace
     mesh, unfelt, found = reference.mesh, reference.unfelt, list[RimPlace]()
     if unfelt is None or not reference.is_open.any():
         return tuple(found)
-    rim, ups = mesh.vertices[reference.is_open], mesh.normals[reference.is_open]
+    ups = mesh.normals[reference.is_open]
+    some = ups.any(axis=1)  # Vertices of triangles without an area have no normal.
+    rim, ups = mesh.vertices[reference.is_open][some], ups[some]
     radii = charts.radii[cKDTree(charts.origins).query(rim)[1]]
     # A vertex has a third of the area of its triangles.
     areas = np.linalg.norm(triangle_cross(unfelt.vertices[unfelt.triangles]), axis=1).repeat(3) / 6.0
     areas = np.bincount(unfelt.triangles.ravel(), areas, len(unfelt.vertices))
     around = cKDTree(unfelt.vertices).query_ball_point(rim, radii)
-    gains = np.minimum([areas[some].sum() for some in around], np.pi * radii**2)
+    gains = np.minimum([areas[near].sum() for near in around], np.pi * radii**2)
     left = np.arange(len(rim))
     while len(left):
         best = left[np.argmax(gains[left])]

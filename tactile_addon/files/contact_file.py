@@ -112,7 +112,7 @@ def _contours(name: str, rows: Array) -> list[core.Contour]:
         np.column_stack([table[key] for key in NORMAL_COLUMNS]) if set(NORMAL_COLUMNS) <= set(table) else None
     )
     titles, labels = np.unique(table.get("curve", np.ones(len(points))), return_inverse=True)
-    return contact_rows.contours(name, labels, points, normals, table.get("time"), titles)
+    return contact_rows.contours(name, labels, points, normals, table.get("time"), titles.tolist())
 
 
 def vertex_rows(name: str, data: bytes) -> tuple[Any, Fields, int]:
