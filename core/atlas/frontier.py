@@ -307,13 +307,13 @@ def _between(points: Array, tried: Sequence[Vector]) -> int:
 
 def border_places(mesh: Mesh) -> Iterator[RimPlace]:
     """Places on the border of a mesh, some edges apart, with the way beyond it."""
-    ends, corners, radius = mesh.border, mesh.vertices, BORDER_RADIUS * mesh.edge
-    normals, taken = mesh.normals, np.zeros(len(ends), dtype=bool)
-    middles = corners[ends].mean(axis=1)
-    for i, (a, b) in enumerate(ends):
+    corners, radius = mesh.vertices[mesh.border], BORDER_RADIUS * mesh.edge
+    ups = normalized(mesh.normals[mesh.border].sum(axis=1))
+    ways = normalized(np.cross(corners[:, 1] - corners[:, 0], ups))
+    taken = ~ways.any(axis=1)  # Triangles without an area have no way beyond them.
+    middles = corners.mean(axis=1)
+    for i, middle in enumerate(middles):
         if taken[i]:
             continue
-        taken |= ((middles - middles[i]) ** 2).sum(axis=1) < (BORDER_APART * radius) ** 2
-        up = normalized(normals[a] + normals[b])
-        beyond = normalized(np.cross(corners[b] - corners[a], up))
-        yield RimPlace(vector_of(middles[i]), vector_of(up), vector_of(beyond), radius)
+        taken |= ((middles - middle) ** 2).sum(axis=1) < (BORDER_APART * radius) ** 2
+        yield RimPlace(vector_of(middle), vector_of(ups[i]), vector_of(ways[i]), radius)

@@ -9,7 +9,7 @@ import core
 from core.atlas import touching
 from core.atlas.charts import AZIMUTHS
 from core.atlas.finger import Finger
-from core.atlas.frontier import Frontier, _between
+from core.atlas.frontier import Frontier, _between, border_places
 from core.atlas.meshing import Mesh
 from core.atlas.reference_mesh import ReferenceMesh
 from core.steps import result_of
@@ -195,3 +195,14 @@ def test_a_patch_that_faces_inward_is_no_touch(monkeypatch):
     atlas = core.explore_object(BALL, BALL.start, BALL.outward, tolerance=1e-2, most=9, rng=0)
     assert len(atlas.patches) == 1
     assert atlas.status == "uncertain"
+
+
+def test_no_place_on_a_border_is_at_triangles_without_an_area():
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], *3 * [[5.0, 5.0, 0.0]]])
+    triangles = np.array([[0, 1, 2], [3, 4, 5]])
+    mesh = Mesh(corners, triangles, np.zeros(6), np.zeros(6, dtype=np.intp))
+    places = list(border_places(mesh))
+    assert places
+    for place in places:
+        assert np.linalg.norm(place.normal) == pytest.approx(1.0)
+        assert np.linalg.norm(place.ahead) == pytest.approx(1.0)
