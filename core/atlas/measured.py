@@ -102,26 +102,24 @@ def cover_contacts(
     reference = yield from part_of(joined_surface(found, charts, largest, contacts.off), 1.0, 1.0)
     uncovered = uncovered_places(reference, charts)
     atlas = Atlas(tuple(found), charts, reference, largest, uncovered, contacts=contacts)
-    return (yield from _judged(atlas, contacts, doubts, cloud.noise, noise, radius))
+    return (yield from _judged(atlas, cloud, doubts, noise, radius))
 
 
 def _judged(
-    atlas: Atlas, contacts: MeasuredContacts, doubts: list[Doubt], given: float, noise: float, radius: float
+    atlas: Atlas, cloud: "_Cloud", doubts: list[Doubt], noise: float, radius: float
 ) -> Generator[float, None, Atlas]:
     """The atlas with its doubts: these, and those of how contacts and surface are off each other; yields 1.
 
-    given, noise : the noise that was given or 0, and that of the fit
+    noise : that of the fit
     radius : the least of a patch
     """
-    from scipy.spatial import cKDTree
-
-    mesh, most = atlas.reference.mesh, atlas.tolerance or GROWN * radius
+    contacts, mesh, most = cloud.contacts, atlas.reference.mesh, atlas.tolerance or GROWN * radius
     off_surface = partial(_off_surface, atlas, noise, most)
     distances, far, is_turned = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
-    off_planes = partial(_off_planes, atlas.charts, cKDTree(contacts.points), contacts)
+    off_planes = partial(_off_planes, atlas.charts, cloud)
     between, alike = yield from chunked(off_planes, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
     worst, widest = _largest_cluster(far, distances, contacts.links), np.argsort(-between, kind="stable")
-    limit, fit_noise = MOST_OFF * float(np.ptp(contacts.points, axis=0).max()), 0.0 if given else noise
+    limit, fit_noise = MOST_OFF * float(np.ptp(contacts.points, axis=0).max()), 0.0 if cloud.noise else noise
     off = _doubts_of_contacts(contacts, distances, far, worst, is_turned, limit)
     gaps = widest[:0] if atlas.uncovered else widest[between[widest] > limit]
     sparse = [Doubt("sparse", between[i], limit, (place_text(mesh.vertices[[i]]),)) for i in gaps[:1]]
@@ -262,16 +260,14 @@ def _off_surface(
     return np.abs(distances), far | is_turned, is_turned
 
 
-def _off_planes(
-    charts: Charts, tree: Any, contacts: MeasuredContacts, points: Array, normals: Array
-) -> tuple[Array, Indices]:
+def _off_planes(charts: Charts, cloud: "_Cloud", points: Array, normals: Array) -> tuple[Array, Indices]:
     """How far places (n, 3) of the surface are off the planes of nearest contacts, and which these are, (n,).
 
     Of contacts nearby it is one that faces alike, if there is any. It is 0 on patches. Between them the
     surface may be anywhere up to these planes: an edge that no contact is near is cut off by half of the
     distance of contacts.
     """
-    near = tree.query(points, ABREAST)[1]
+    near, contacts = cloud.tree.query(points, ABREAST)[1], cloud.contacts
     is_alike = np.einsum("nki,ni->nk", contacts.normals[near], normals) > AGREE
     nearest = near[np.arange(len(points)), is_alike.argmax(axis=1)]
     off = np.abs(row_dot(contacts.normals[nearest], points - contacts.points[nearest]))

@@ -128,7 +128,7 @@ def oriented(points: Array, planes: Planes, known: Array | None = None, up: Arra
     i, j = np.repeat(np.arange(len(points)), LINKS), planes.links.ravel()
     # Winding numbers choose between the signs of pieces, so any link between these will do.
     roots = np.unique(connected_pieces(i, j, len(points))[1], return_index=True)[1]
-    i, j = np.append(i, 0 * roots[1:]), np.append(j, roots[1:])
+    i, j = np.append(i, np.zeros_like(roots[1:])), np.append(j, roots[1:])
     sides, order, ends = _propagated_signs(points, planes.normals, i, j)
     normals = sides[:, None] * planes.normals
     is_root = np.isin(order, roots)

@@ -9,7 +9,7 @@ those within a facet share an error. The fit explains such contacts, so its own 
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,15 +151,14 @@ def _neighbors(curve: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.in
 
 
 def _even(of: _Turns) -> Array:
-    """The rates of turning (m,) that steps have around each turn: a fold does not change their median."""
-    at, number = np.arange(len(of.curve)), np.bincount(of.curve)
-    last = (number.cumsum() - 1)[of.curve, None]
-    first = last - number[of.curve, None] + 1
-    # Beyond the ends of a curve its last steps follow in reverse order.
-    around = first + np.abs(at[:, None] + np.arange(AROUND) - AROUND // 2 - first)
-    around = np.maximum(last - np.abs(last - around), first)
-    even: Array = np.median((of.turns / np.maximum(of.steps, SMALLEST))[around], axis=1)
-    return even
+    """The rates of turning (m,) that steps have around each turn: a fold does not change their median.
+
+    Beyond the ends of a curve its last steps follow in reverse order.
+    """
+    from scipy.ndimage import median_filter
+
+    rates, ends = of.turns / np.maximum(of.steps, SMALLEST), np.bincount(of.curve).cumsum()[:-1]
+    return np.concatenate([median_filter(own, AROUND, mode="mirror") for own in np.split(rates, ends)])
 
 
 def _unexplained(of: _Turns, beyond: Array) -> Array:
@@ -190,11 +189,11 @@ def _without_outliers(of: _Turns, turns: Array) -> Array:
     return turns + np.append(moved, 0.0) - np.append(0.0, moved)
 
 
-def _counted(of: _Turns, turns: Array) -> tuple[Any, Array]:
+def _counted(of: _Turns, turns: Array) -> tuple[Array, Array]:
     """The sums (c,) of the absolute turns (m,) of curves, and how many bends (c,) these are."""
     curve, number = of.curve, np.bincount(of.curve)
     length = np.maximum(np.bincount(curve, of.steps), SMALLEST)
-    turned = np.bincount(curve, np.abs(turns))
+    turned = np.asarray(np.bincount(curve, np.abs(turns)), dtype=float)
     squares = np.bincount(curve, turns**2 / np.maximum(of.steps, (SHORT * length / number)[curve]))
     bends: Array = np.where(turned > FLAT, number * turned**2 / np.maximum(length * squares, 1e-300), number)
     return turned, bends

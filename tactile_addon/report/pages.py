@@ -3,6 +3,7 @@
 """Export Report: the pages of a patch, of a stability map and of a whole object as files for a browser."""
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -149,11 +150,14 @@ def write(path: str | Path, obj: Object) -> None:
 
     Raises ValueError if the object was edited, and OSError if the file cannot be written.
     """
-    pages = {patch_record.MAP_RECORD: map_page, patch_record.ATLAS_RECORD: object_page}
-    make = next((pages[key] for key in pages if key in obj), None)
-    given = (obj,) if make else (obj, patch_record.reconstruction_of(obj))
+    if patch_record.MAP_RECORD in obj:
+        make = partial(map_page, obj)
+    elif patch_record.ATLAS_RECORD in obj:
+        make = partial(object_page, obj)
+    else:
+        make = partial(patch_page, obj, patch_record.reconstruction_of(obj))
     with patch_record.reading(obj):
-        text = (make or patch_page)(*given)
+        text = make()
     whole_file.write_text(path, text)
 
 
