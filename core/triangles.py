@@ -2,9 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rows of vectors and of triangles."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from .arguments import Array
+
+Indices = NDArray[np.integer[Any]]
 
 LEAST_DIVISOR = 1e-300  # No vector is divided by less.
 
@@ -64,20 +69,19 @@ def middles_of_parts(n: int) -> Array:
     return np.column_stack([first, second, 1.0 - first - second])
 
 
-def cut_to_edges(
-    points: Array, triangles: Array, owners: Array, longest: float
-) -> tuple[Array, Array, Array]:
-    """Triangles (m, 3) between points (n, 3), cut until no edge is longer; each has the owner, (m,), it had.
+def cut_to_edges(points: Array, triangles: Indices, longest: float) -> tuple[Array, Indices, Indices]:
+    """Points (n, 3 or more) and triangles (m, 3) without longer edges; which given triangle each is of, (m,).
 
     Triangles are halved at the middle of their longest edge. A neighbor may not be, which leaves no gap, as
-    triangles are flat.
+    triangles are flat. Points may have more columns than coordinates.
     """
+    whole = np.arange(len(triangles))
     while True:
-        corners = points[triangles]
+        corners = points[triangles, :3]
         sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
         large = sides.max(axis=1) > longest
         if not large.any():
-            return points, triangles, owners
+            return points, triangles, whole
         first = sides[large].argmax(axis=1)[:, None]
         a, b, c = np.take_along_axis(triangles[large], (first + np.arange(3)) % 3, axis=1).T
         ends, number = np.unique(np.sort(np.column_stack([a, b]), axis=1), axis=0, return_inverse=True)
@@ -85,4 +89,4 @@ def cut_to_edges(
         points = np.vstack([points, points[ends].mean(axis=1)])
         halves = [triangles[~large], np.column_stack([a, middle, c]), np.column_stack([middle, b, c])]
         triangles = np.vstack(halves).astype(np.int32)
-        owners = np.concatenate([owners[~large], owners[large], owners[large]])
+        whole = np.concatenate([whole[~large], whole[large], whole[large]])

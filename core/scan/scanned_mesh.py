@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array, finite_array
-from ..triangles import closest_point, normalized, triangle_cross
+from ..triangles import closest_point, cut_to_edges, normalized, triangle_cross
 
 LARGEST_MESH = 40.0
 LONGEST_EDGE = 0.25  # Longer edges are halved, so that a patch covers a hundred triangles.
@@ -51,7 +51,9 @@ def mesh_of(co: Array, corners: NDArray[np.intp], patch: float) -> ScanMesh:
         )
     normals = np.zeros_like(co)
     np.add.at(normals, corners, triangle_cross(co[corners])[:, None])
-    pieces = _bisected(np.concatenate([co, normalized(normals)], axis=1)[corners])
+    oriented = np.concatenate([co, normalized(normals)], axis=1)
+    oriented, cut, _ = cut_to_edges(oriented, corners, LONGEST_EDGE)
+    pieces = oriented[cut]
     across, mean = triangle_cross(pieces[..., :3]), pieces.mean(axis=1)
     lengths, bends = np.linalg.norm(across, axis=1), np.linalg.norm(mean[:, 3:], axis=1)
     good = (lengths > 1e-12) & (bends > 1e-6)
@@ -60,20 +62,6 @@ def mesh_of(co: Array, corners: NDArray[np.intp], patch: float) -> ScanMesh:
     centers, smooth = mean[good, :3], mean[good, 3:] / bends[good, None]
     tree = cKDTree(np.concatenate([centers, FACING_WEIGHT * smooth], axis=1))
     return ScanMesh(pieces[good, :, :3], across[good] / lengths[good, None], centers, smooth, tree)
-
-
-def _bisected(pieces: Array) -> Array:
-    """Triangles with normals, (m, 3, 6), that are halved until no edge is longer than LONGEST_EDGE."""
-    done = []
-    while len(pieces):
-        edges = np.linalg.norm((np.roll(pieces, -1, axis=1) - pieces)[..., :3], axis=2)
-        long = edges.max(axis=1) > LONGEST_EDGE
-        done.append(pieces[~long])
-        order = (edges[long].argmax(axis=1)[:, None] + np.arange(3)) % 3
-        a, b, c = np.moveaxis(np.take_along_axis(pieces[long], order[..., None], axis=1), 1, 0)
-        middle = 0.5 * (a + b)
-        pieces = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
-    return np.concatenate(done)
 
 
 def mesh_distances(places: Array, oriented: Array, mesh: ScanMesh, neighbors: int) -> tuple[Array, Array]:

@@ -125,9 +125,10 @@ class StabilityMap:
 
     def steps(self) -> Iterator[None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
-        self.points, self.triangles, self.owners = cut_to_edges(
-            self.surface.points, self.surface.triangles, self.surface.owners, self.spacing
+        self.points, self.triangles, whole = cut_to_edges(
+            self.surface.points, self.surface.triangles, self.spacing
         )
+        self.owners = self.surface.owners[whole]
         corners = self.points[self.triangles]
         self._middles = corners.mean(axis=1)
         self.areas = 0.5 * np.linalg.norm(triangle_cross(corners), axis=1)

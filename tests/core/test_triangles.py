@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from core.triangles import closest_point, middles_of_parts
+from core.triangles import closest_point, cut_to_edges, middles_of_parts
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 7])
@@ -33,3 +33,14 @@ def test_the_closest_point_of_a_triangle_is_the_nearest_of_many():
     assert ours == pytest.approx(nearest, abs=0.02)
     assert weights.min() > -1e-9 and weights.sum(axis=1) == pytest.approx(np.ones(200))
     assert np.einsum("nk,nki->ni", weights, corners) == pytest.approx(feet)
+
+
+def test_triangles_are_cut_by_their_edges_and_not_by_other_columns():
+    corners = np.column_stack([0.1 * np.eye(3), np.diag([1.0, -1.0, 1.0])])
+    points, triangles, whole = cut_to_edges(corners, np.array([[0, 1, 2]]), 0.2)
+    assert (points == corners).all() and triangles.tolist() == [[0, 1, 2]] and whole.tolist() == [0]
+    points, triangles, whole = cut_to_edges(corners, np.array([[0, 1, 2]]), 0.1)
+    cut = points[triangles]
+    assert np.linalg.norm((cut - np.roll(cut, 1, axis=1))[..., :3], axis=2).max() <= 0.1
+    assert points[3:] == pytest.approx(points[3:, :3] @ np.linalg.inv(corners[:, :3]) @ corners)
+    assert (whole == 0).all()

@@ -331,12 +331,6 @@ def test_long_triangles_are_halved_until_a_patch_covers_many():
     assert mesh.smooth == pytest.approx(np.tile([0.0, 0.0, 1.0], (len(mesh.smooth), 1)))
 
 
-def test_a_piece_is_long_by_its_edges_and_not_by_its_normals():
-    corners = 0.1 * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    normals = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    assert len(scanned_mesh._bisected(np.concatenate([corners, normals], axis=1)[None])) == 1
-
-
 def test_contours_are_tried_in_turns_of_ten_degrees(monkeypatch):
     tried, scores = [], pose_search._scores
     monkeypatch.setattr(
