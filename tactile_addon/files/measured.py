@@ -17,7 +17,7 @@ from ...core.steps import part_of
 from ..touch.single_precision import require_single
 from ..touch.touch_object import Touched, reference_axes
 from ..touch.touch_report import TouchReport, measures, reconstruction_report, suggestion_report
-from ..touch.types import Point
+from ..touch.types import Array, Point
 from ..whole_object.whole_surface import WholeSurface
 from . import contact_file
 
@@ -157,11 +157,7 @@ def fit(
     point, outward = of_file if point is None else point, up if outward is None else outward
     if normal_std:
         contours = [c if c.normals is None else replace(c, normal_std=normal_std) for c in contours]
-    distances = None
-    if point is None and contours:
-        point, distances = core.common_point(contours)
-    elif point is None:
-        point = np.mean(np.vstack([stroke.points for stroke in strokes]), axis=0)
+    point, distances = _reference_point(contours, strokes) if point is None else (point, None)
     contours, felt = [core.in_running_order(c, point) for c in contours], [*contours, *strokes]
     reconstruct = partial(core.reconstruct, point, contours, strokes=strokes, **options)
     unknown = outward is None and not any(c.normals is not None for c in felt)
@@ -182,6 +178,15 @@ def fit(
         report["misses"] = distances.tolist()
     report["seconds"] = {"fit": perf_counter() - start}
     return Touched(None, result, report)
+
+
+def _reference_point(
+    contours: Sequence[core.Contour], strokes: Sequence[core.Contour]
+) -> tuple[Any, Array | None]:
+    """Where curves meet, and by how much each misses it; without curves it is the mean of the strokes."""
+    if contours:
+        return core.common_point(contours)
+    return np.mean(np.vstack([stroke.points for stroke in strokes]), axis=0), None
 
 
 def _report(result: core.Reconstruction, method: str) -> TouchReport:

@@ -23,6 +23,8 @@ def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
     """(label, value) of everything there is to say of a patch, with lengths in the unit of scene or file."""
     seconds, unit = report["seconds"], unit_of_report(bpy.context.scene, report)
     contacts = _measured_contacts(report) if "curves" in report else _tracked(report)
+    texture = _shared(report, "residual", unit) if report["residual"] else "none"
+    total = rounded(report["total_absolute_curvature"], 0, report["radius"])
     return [
         ("touched", report["source"]),
         ("verdict", f"{verdict(report, unit)}. {report['message']}"),
@@ -38,19 +40,13 @@ def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
         ("mean curvature", measured(report, "mean_curvature", -1, unit)),
         ("shape index", "none, it is flat" if is_flat(report) else f"{report['shape_index']:.3f}"),
         ("curvedness", said(report, "curvedness", -1, unit)),
-        (
-            "texture beside the polynomial",
-            _shared(report, "residual", unit) if report["residual"] else "none",
-        ),
+        ("texture beside the polynomial", texture),
         ("contacts off the patch, mean", _shared(report, "fit_error", unit)),
         ("standard deviation of the height", _shared(report, "height_std", unit)),
         ("mesh to patch", _verification(report, unit)),
         *_verified_rows(report, unit),
         ("suggested next plane", _suggestion(report["suggested_plane"], unit)),
-        (
-            "total absolute curvature",
-            f"{rounded(report['total_absolute_curvature'], 0, report['radius']):.4g}",
-        ),
+        ("total absolute curvature", f"{total:.4g}"),
         ("condition number", f"{report['condition_number']:.2g}"),
         ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in seconds.items())),
     ]
