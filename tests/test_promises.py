@@ -74,7 +74,7 @@ PROMISES = [
     ("methods", "if one tap is off by more than ten standard deviations", taps.TOO_FAR_OFF / 10),
     ("methods", "all are by more than two on average", status.CONTRADICTING / 2),
     ("methods", "if more than # % of its area has no surface", 100 * status.DOUBTFUL_GAP),
-    ("methods", "each a sixth shorter", round(1 / (1 - 0.5 ** (1 / len(extent.RUNGS)))) / 6),
+    ("methods", "each a sixth shorter", round(1 / (1 - 0.5 ** (1 / extent.RUNGS))) / 6),
     ("methods", "At most one in a hundred contacts is off it by more than five", 100 * explained.FEW),
     ("methods", "off it by more than five deviations", explained.TOO_FAR / 5),
     ("methods", "at most # % of the radius in the mean", 100 * extent.TAPS_OFF),

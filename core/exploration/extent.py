@@ -27,10 +27,10 @@ from ..reconstruction.status import DOUBTFUL_STD
 from .options import ExplorationOptions
 from .taps import tapped
 
-# benchmarks.real --only automatic chose these. Half curves of these numbers of contacts are tried, from long
-# to short, then the same with half the step. Fewer give less area on scans.
-RUNGS = (16, 13, 11, 9)
-HALVINGS = 6  # The step is halved this many times. Fewer leave touches of coarse meshes in doubt.
+# benchmarks.real --only automatic chose these. The longest half curves that are tried have so many contacts.
+# Each next one is shorter by the same ratio; after these, which halve it, the step is halved. Fewer give less
+MOST_CONTACTS, RUNGS = 16, 4  # area.
+HALVINGS = 6  # The step is halved this many times. With 7 more patches of single facets are taken for sure.
 # Contacts up to this roughness are fitted: with 0.012 there are a quarter more fits, and one of 540 more is
 ROUGH = 0.01  # sure.
 # A sure patch is off its taps by at most this share of the radius in the mean, where a place without surface
@@ -152,7 +152,7 @@ class Touch:
         """
         explained = max(self.options.noise, self.options.largest_std or 0.0)
         others: list[tuple[float, tuple[float, int]]] = []
-        longest = self.farthest / RUNGS[0], RUNGS[0]
+        longest = self.farthest / MOST_CONTACTS, MOST_CONTACTS
         for rung in self._rungs():
             contours, _ = next(self._denser(*rung))
             points = np.vstack([contour.points for contour in contours])
@@ -169,11 +169,12 @@ class Touch:
         Half curves that the surface ends all are the same on longer rungs, which are left out.
         """
         for halvings in range(HALVINGS + 1):
-            finest = self.farthest / RUNGS[0] / 2.0**halvings
+            finest = self.farthest / MOST_CONTACTS / 2.0**halvings
             step = self.options.step or finest
-            contours = self._followed(step, RUNGS[0] * finest)
+            contours = self._followed(step, MOST_CONTACTS * finest)
             longest = max(max(_sides(contour, self.point)) for contour in contours)
-            counts = [int(n * finest / step * (1.0 + 1e-6)) for n in (*RUNGS, RUNGS[0] // 2)]
+            shares = 2.0 ** (-np.arange(RUNGS + 1) / RUNGS)
+            counts = (MOST_CONTACTS * shares * finest / step + 1e-6).astype(int).tolist()
             yield from ((step, count) for count, shorter in pairwise(counts) if min(longest, count) > shorter)
 
     def _felt(self, step: float, count: int) -> Steps:

@@ -18,7 +18,7 @@ from ..reconstruction.from_contours import fitted
 from ..reconstruction.options import FitOptions
 from ..reconstruction.start import Given
 from ..reconstruction.strokes import gathered
-from .extent import RUNGS, Answer, Exploration, Request, Steps, Touch
+from .extent import MOST_CONTACTS, Answer, Exploration, Request, Steps, Touch
 from .options import ExplorationOptions
 from .taps import HAIR
 
@@ -81,7 +81,7 @@ def _farthest(
 
     def ended(length: float) -> bool:
         """Whether all half curves, felt with few contacts, end before that, or nothing can be felt so."""
-        lengths = {"extent": length, "step": length / RUNGS[-1]}
+        lengths = {"extent": length, "step": length / (MOST_CONTACTS // 2)}
         try:
             contours = (contour for plane in planes for contour in track_along([plane], **lengths))
             return not any(EXTENT in (contour.stops or ()) for contour in contours)
