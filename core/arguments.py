@@ -59,15 +59,15 @@ def list_of(name: str, values: Iterable[T], kind: type[T]) -> list[T]:
     if len(shape) == 2:
         raise ValueError(f"{name}: expected a list, got one array of shape {shape}: put it into a list")
     try:
-        found = None if isinstance(values, str) else list(values)
+        items = None if isinstance(values, str) else list(values)
     except TypeError:
-        found = None
-    if found is None:
+        items = None
+    if items is None:
         raise ValueError(f"{name}: expected a list, got {shown(values)}")
-    for value in found:
+    for value in items:
         if not isinstance(value, kind):
             raise ValueError(f"{name}: expected a list of {kind.__name__}, got {shown(value)} in it")
-    return found
+    return items
 
 
 def shown(value: object) -> str:

@@ -37,11 +37,11 @@ def chunked(
 
     Yields `share` after each chunk and each array. The function is called once if there are no rows.
     """
-    parts, found = [], []
+    parts, chunks = [], []
     for start in range(0, max(len(arrays[0]), 1), size):
         parts.append(function(*(array[start : start + size] for array in arrays)))
         yield share
     for values in zip(*parts, strict=True):
-        found.append(np.concatenate(values))
+        chunks.append(np.concatenate(values))
         yield share
-    return tuple(found)
+    return tuple(chunks)

@@ -49,7 +49,8 @@ def closest_point(triangles: Array, points: Array) -> tuple[Array, Array]:
     on_bc = np.clip((d2 - d1 + aa - bb) / np.maximum(aa - 2.0 * bb + cc, LEAST_DIVISOR), 0.0, 1.0)
     zero = np.zeros_like(v)
     tried = np.stack(
-        [np.stack(each, axis=-1) for each in ((on_ab, zero), (zero, on_ac), (1.0 - on_bc, on_bc))], axis=-2
+        [np.stack(shares, axis=-1) for shares in ((on_ab, zero), (zero, on_ac), (1.0 - on_bc, on_bc))],
+        axis=-2,
     )
     off = ap[..., None, :] - tried[..., :1] * ab[..., None, :] - tried[..., 1:] * ac[..., None, :]
     best = np.argmin(row_dot(off, off), axis=-1)[..., None, None]
@@ -61,11 +62,11 @@ def closest_point(triangles: Array, points: Array) -> tuple[Array, Array]:
 def middles_of_parts(n: int) -> Array:
     """The barycentric coordinates (n^2, 3) of the middles of n^2 equal parts of a triangle.
 
-    Lines parallel to the sides divide each side into n.
+    Lines parallel to the sides divide axis side into n.
     """
     i, j = (index.ravel() for index in np.indices((n, n)))
     up, down = i + j < n, i + j < n - 1
-    first, second = (np.concatenate([(each[up] + 1 / 3), (each[down] + 2 / 3)]) / n for each in (i, j))
+    first, second = (np.concatenate([(axis[up] + 1 / 3), (axis[down] + 2 / 3)]) / n for axis in (i, j))
     return np.column_stack([first, second, 1.0 - first - second])
 
 

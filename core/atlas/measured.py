@@ -99,10 +99,10 @@ def cover_contacts(
     cloud = _Cloud(contacts, cKDTree(contacts.points), noise, largest)
     yield 0.0
     radius, noise = yield from cloud.least_radius_and_noise(radius)
-    found, charts = yield from _patches(cloud._replace(noise=noise), radius)
-    reference = yield from part_of(joined_surface(found, charts, largest, contacts.off), 1.0, 1.0)
+    patches, charts = yield from _patches(cloud._replace(noise=noise), radius)
+    reference = yield from part_of(joined_surface(patches, charts, largest, contacts.off), 1.0, 1.0)
     uncovered = uncovered_places(reference, charts)
-    atlas = Atlas(tuple(found), charts, reference, largest, uncovered, contacts=contacts)
+    atlas = Atlas(tuple(patches), charts, reference, largest, uncovered, contacts=contacts)
     return (yield from _judged(atlas, cloud, doubts, noise, radius))
 
 
@@ -362,8 +362,8 @@ class _Cloud(NamedTuple):
         points, normals = self.contacts.points[places], self.contacts.normals[places]
         strokes = [[self.contacts.points[self.same_sheet(i, radius)]] for i in places]
         none: list[list[Contour]] = [[] for _ in places]
-        found = reconstruct_many(points, none, outward=normals, strokes_list=strokes, noise=self.noise)
-        return [r if isinstance(r, Reconstruction) else None for r in found]
+        results = reconstruct_many(points, none, outward=normals, strokes_list=strokes, noise=self.noise)
+        return [r if isinstance(r, Reconstruction) else None for r in results]
 
     def rim(self, i: int, r: Reconstruction) -> Array:
         """The radii (AZIMUTHS,) of a patch, in unit radius, to where its wall meets another or was not felt.
@@ -434,9 +434,9 @@ class _Cloud(NamedTuple):
         points = self.contacts.points
         some = np.linspace(0, len(points) - 1, SOME_PLACES).astype(np.intp).tolist()
         for _ in range(WIDENINGS):
-            found = [(i, r) for i, r in zip(some, self.patches(some, radius), strict=True) if r is not None]
-            if len(found) * 2 >= SOME_PLACES:
-                off = np.concatenate([self.distances(r, self.same_sheet(i, radius)) for i, r in found])
+            patches = [(i, r) for i, r in zip(some, self.patches(some, radius), strict=True) if r is not None]
+            if len(patches) * 2 >= SOME_PLACES:
+                off = np.concatenate([self.distances(r, self.same_sheet(i, radius)) for i, r in patches])
                 return radius, self.noise or max(1.4826 * float(np.median(np.abs(off))), MISFIT * radius)
             radius *= WIDENING
             yield 0.0
@@ -454,7 +454,7 @@ def _patches(cloud: _Cloud, radius: float) -> Generator[float, None, tuple[list[
     Yields the share that is covered.
     """
     points, radii, last = cloud.contacts.points, [radius * WIDENING**k for k in range(WIDENINGS)], WIDENINGS
-    left, found, tables = np.ones(len(points), dtype=bool), [], []
+    left, patches, tables = np.ones(len(points), dtype=bool), [], []
     for i in range(len(left)):
         if not left[i]:
             continue
@@ -462,15 +462,15 @@ def _patches(cloud: _Cloud, radius: float) -> Generator[float, None, tuple[list[
         r, last = cloud.longest_sure(middle, radii, last)
         left[cloud.same_sheet(i, PATCHES_APART * radius) if r is None else i] = False
         if r is not None:
-            found.append(r)
+            patches.append(r)
             tables.append(tabulate(r, cloud.rim(middle, r), deviations=True))
             chart, some = stacked([r], tables[-1:]), cloud.same_sheet(middle, PATCHES_APART * r.radius)
             x, y, _ = chart.local(points[some], np.arange(len(some)), np.zeros(len(some), dtype=np.intp))
             left[some] &= chart.shares(x, y, np.zeros(len(some), dtype=np.intp)) > COVERED
         yield 1.0 - float(left.mean())
-    if not found:
+    if not patches:
         raise ValueError(
             f"noise: expected one that explains how contacts are off smooth patches, got {cloud.noise:.3g}: "
             "give a larger one, or leave it out"
         )
-    return found, stacked(found, tables)
+    return patches, stacked(patches, tables)

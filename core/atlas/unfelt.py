@@ -28,9 +28,9 @@ def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[RimPlace
     """
     from scipy.spatial import cKDTree
 
-    mesh, unfelt, found = reference.mesh, reference.unfelt, list[RimPlace]()
+    mesh, unfelt, places = reference.mesh, reference.unfelt, list[RimPlace]()
     if unfelt is None or not reference.is_open.any():
-        return tuple(found)
+        return tuple(places)
     ups = mesh.normals[reference.is_open]
     some = ups.any(axis=1)  # Vertices of triangles without an area have no normal.
     rim, ups = mesh.vertices[reference.is_open][some], ups[some]
@@ -43,6 +43,6 @@ def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[RimPlace
     left = np.arange(len(rim))
     while len(left):
         best = left[np.argmax(gains[left])]
-        found.append(place_at(rim[best], ups[best], float(radii[best]), float(gains[best])))
+        places.append(place_at(rim[best], ups[best], float(radii[best]), float(gains[best])))
         left = left[np.linalg.norm(rim[left] - rim[best], axis=1) > APART * radii[best]]
-    return tuple(found)
+    return tuple(places)

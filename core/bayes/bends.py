@@ -69,8 +69,8 @@ def bends_of(contours: Sequence[Contour], frame: Frame, radius: float, noise: fl
     kinds = [
         [c for c in contours if (c.normals is None) is bare and len(c.points) > 2] for bare in (False, True)
     ]
-    each = [_bends(_turns(kind, frame, radius, noise)) for kind in kinds if kind]
-    x, y, turned, contacts, shares, mean, most, even = np.concatenate([np.empty((8, 0)), *each], axis=1)
+    of_kinds = [_bends(_turns(kind, frame, radius, noise)) for kind in kinds if kind]
+    x, y, turned, contacts, shares, mean, most, even = np.concatenate([np.empty((8, 0)), *of_kinds], axis=1)
     second = 2.0 * np.array([x * x, x * y, y * y])
     stds = shares * np.clip(np.abs(terms @ second - even), mean, most)
     sharing = float(turned @ contacts) / max(float(turned.sum()), SMALLEST)

@@ -66,8 +66,8 @@ def neg2_log_evidence(heights: Array, counts: Array, slopes: Array, prior: Array
     bordered = bordered[:, None].repeat(len(prior), axis=1)
     np.einsum("bwnii->bwni", bordered)[..., :-1] += (1.0 / prior)[:, None]  # a view
     pivots = np.einsum("bwnii->bwni", np.linalg.cholesky(bordered))
-    found: Array = 2.0 * np.log(pivots[..., :-1]).sum(axis=-1) + pivots[..., -1] ** 2
-    return found + (counts[:, None] * np.log(noises**2))[:, None] + np.log(prior).sum(axis=1)[:, None]
+    neg2_log: Array = 2.0 * np.log(pivots[..., :-1]).sum(axis=-1) + pivots[..., -1] ** 2
+    return neg2_log + (counts[:, None] * np.log(noises**2))[:, None] + np.log(prior).sum(axis=1)[:, None]
 
 
 def noise_grid(heights: Array, counts: Array, floor: Array) -> Array:
@@ -88,8 +88,8 @@ def hyperparameters(heights: Array, counts: Array, slopes: Array, floor: Array) 
     """
     noises = noise_grid(heights, counts, floor)
     groups = [slice(start, start + GROUP) for start in range(0, len(noises), GROUP)]
-    found = [neg2_log_evidence(heights[g], counts[g], slopes[g], VARIANCES, noises[g]) for g in groups]
-    p = likelihoods(np.concatenate(found) + UNUSUAL[:, None])
+    neg2_logs = [neg2_log_evidence(heights[g], counts[g], slopes[g], VARIANCES, noises[g]) for g in groups]
+    p = likelihoods(np.concatenate(neg2_logs) + UNUSUAL[:, None])
     noise = np.sqrt(np.einsum("bn,bn->b", p.sum(axis=1), noises**2))
     return Hyperparameters(p.sum(axis=2) @ VARIANCES, noise)
 
@@ -112,15 +112,15 @@ def process_hyperparameters(
     """
     noises = least * (most / least) ** np.linspace(0.0, 1.0, PROCESS_NOISES)
     prior = np.minimum(USUAL_VARIANCES, MOST_VARIANCE)
-    found = process_neg2_log_evidence(rows, kernels, prior, noises)
-    p = likelihoods(found.reshape(1, len(kernels), -1), POWER).reshape(found.shape)
+    neg2_logs = process_neg2_log_evidence(rows, kernels, prior, noises)
+    p = likelihoods(neg2_logs.reshape(1, len(kernels), -1), POWER).reshape(neg2_logs.shape)
     noise = np.sqrt(p.sum(axis=(0, 1)) @ noises**2)
     sextics = np.minimum(prior_variances(SEXTIC_WAVINESS), MOST_VARIANCE)
     gram, count = (rows @ rows.T)[None], np.array([rows.shape[1]])
     # What is added there to -2 log likelihood is taken off again.
     without = neg2_log_evidence(gram, count, np.zeros_like(gram), sextics, np.array([[most]])) - 1.0
-    best = min(found.min(), without.min())
-    use_gp = np.exp(0.5 * (best - found)).mean() > ODDS * np.exp(0.5 * (best - without)).mean()
+    best = min(neg2_logs.min(), without.min())
+    use_gp = np.exp(0.5 * (best - neg2_logs)).mean() > ODDS * np.exp(0.5 * (best - without)).mean()
     return Hyperparameters(prior, noise, p.sum(axis=2) @ AMPLITUDES**2), bool(use_gp)
 
 
@@ -133,19 +133,19 @@ def process_neg2_log_evidence(rows: Array, kernels: list[Array], prior: Array, n
     noises are tried where the likelihood of a length and an amplitude is not NEGLIGIBLE.
     """
     at, size = partial(_neg2_log_at, *_bordered(rows, kernels, prior)), len(AMPLITUDES)
-    found = np.full((len(kernels), size, PROCESS_NOISES), np.inf)
-    for i, row in enumerate(found):
+    neg2_logs = np.full((len(kernels), size, PROCESS_NOISES), np.inf)
+    for i, row in enumerate(neg2_logs):
         for side in (range(size // 2, size), range(size // 2 - 1, -1, -1)):
             before = row[side.start - side.step, MIDDLE]
             for j in side:
                 row[j, MIDDLE] = now = at(i, AMPLITUDES[j], noises[MIDDLE])
-                if now > max(before, found.min() + NEGLIGIBLE):
+                if now > max(before, neg2_logs.min() + NEGLIGIBLE):
                     break
                 before = now
-    for i, j in np.argwhere(found[..., MIDDLE] < found.min() + NEGLIGIBLE).tolist():
+    for i, j in np.argwhere(neg2_logs[..., MIDDLE] < neg2_logs.min() + NEGLIGIBLE).tolist():
         for k in {*range(PROCESS_NOISES)} - {MIDDLE}:
-            found[i, j, k] = at(i, AMPLITUDES[j], noises[k])
-    return found
+            neg2_logs[i, j, k] = at(i, AMPLITUDES[j], noises[k])
+    return neg2_logs
 
 
 def _bordered(rows: Array, kernels: list[Array], prior: Array) -> tuple[Array, list[Array], Array, float]:
@@ -154,8 +154,8 @@ def _bordered(rows: Array, kernels: list[Array], prior: Array) -> tuple[Array, l
     terms, work, *bordered = np.zeros((2 + len(kernels), m + 1, m + 1))
     terms[:m, :m] = (rows[:-1].T * prior) @ rows[:-1]
     terms[:m, m] = terms[m, :m] = rows[-1]
-    for each, within in zip(bordered, kernels, strict=True):
-        each[:m, :m] = within
+    for matrix, kernel in zip(bordered, kernels, strict=True):
+        matrix[:m, :m] = kernel
     return terms, bordered, work, float(rows[-1] @ rows[-1])
 
 

@@ -92,13 +92,15 @@ def _passes(given: Observations, state: _State, step: int) -> tuple[Array, Surfa
     state, settled, surface = _pass(given, state, step)
     if surface is None:
         return _passes(given, state, step + 1)
-    found, left = (state.axes, surface, state.weights), ~settled
+    settled_state, left = (state.axes, surface, state.weights), ~settled
     if left.any():
         rest = _passes(given.at(left), _State(*(v[left] for v in state)), step + 1)
-        arrays = ((axes, of.mean, of.root, of.noise, of.visibility, w) for axes, of, w in (found, rest))
+        arrays = (
+            (axes, of.mean, of.root, of.noise, of.visibility, w) for axes, of, w in (settled_state, rest)
+        )
         for whole, part in zip(*arrays, strict=True):
             whole[left] = part
-    return found
+    return settled_state
 
 
 def _first_axes(contacts: Array, weights: Array, k1: Array, k2: Array) -> Array:
@@ -126,17 +128,17 @@ def _pass(
     local, normals = given.contacts @ state.axes, given.normals @ state.axes
     data = sextics(local, state.weights, expected, normals, given.point_std / given.noise)
     hyper = _hyperparameters(state, data, given.noise, step)
-    found = mean_given(data, hyper)
+    off_expected = mean_given(data, hyper)
     if normals.size:
-        data = with_scatter(data, found, normals)
-        found = mean_given(data, hyper)
-    mean, weights = expected + found, state.weights
+        data = with_scatter(data, off_expected, normals)
+        off_expected = mean_given(data, hyper)
+    mean, weights = expected + off_expected, state.weights
     # Outliers show only once the axes are level.
     settled = np.full(len(mean), step > 0)
     if step == 1:
         settled = np.hypot(mean[:, 0], mean[:, 1]) <= LEVEL
     if settled.any():
-        students = _student_weights(data.residuals(found), weights > 0.0, given.noise)
+        students = _student_weights(data.residuals(off_expected), weights > 0.0, given.noise)
         weights = np.where(settled[:, None], students, weights)
         settled &= (np.abs(weights - state.weights).max(axis=1) <= SETTLED_WEIGHT) | (step == PASSES - 1)
     # Axes follow the first curve in the end only, because the prior depends on them.
@@ -157,8 +159,8 @@ def _hyperparameters(state: _State, data: Sextics, floor: Array, step: int) -> H
     stale = ((state.weights > 0.0) & (state.weights < 1.0)).any(axis=1) | (step == 1)
     if not stale.any():
         return Hyperparameters(state.prior, state.noise)
-    found, prior, noise = data.hyperparameters(floor, stale), state.prior.copy(), state.noise.copy()
-    prior[stale], noise[stale] = found.prior, found.noise
+    likely, prior, noise = data.hyperparameters(floor, stale), state.prior.copy(), state.noise.copy()
+    prior[stale], noise[stale] = likely.prior, likely.noise
     return Hyperparameters(prior, noise)
 
 
@@ -191,12 +193,12 @@ def posteriors_of(
 
 def _student_weights(residuals: Array, present: NDArray[np.bool_], floor: Array) -> Array:
     """Weights of the contacts, (b, n): all 1 if none of a touch is outlying, 0 where there is no contact."""
-    misses, found = np.abs(residuals), present.astype(float)
+    misses, weights = np.abs(residuals), present.astype(float)
     for i in np.flatnonzero((present & (misses > OUTLYING * floor[:, None])).any(axis=1)):
         ratios = misses[i] / max(floor[i], 1.4826 * float(np.median(misses[i][present[i]])))
         if ratios[present[i]].max() > OUTLYING:
-            found[i] *= (STUDENT + 1.0) / (STUDENT + ratios**2)
-    return found
+            weights[i] *= (STUDENT + 1.0) / (STUDENT + ratios**2)
+    return weights
 
 
 def frame_update(axes: Array, mean: Array, tangent: Array) -> tuple[Array, float, float, float]:

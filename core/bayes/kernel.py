@@ -73,8 +73,8 @@ def kernels(p: Array, q: Array) -> list[Array]:
 
 def derived_kernel(p: Array, places: Array, variances: Array) -> Array:
     """k(p, places) of points (n, 2) and (m, 2), and its derivatives by p: (6, n, m), ordered as PARTIALS."""
-    each = zip(variances, LENGTHS, strict=True)
-    return sum(v * _derived_matern(p[:, None] - places, length) for v, length in each)
+    components = zip(variances, LENGTHS, strict=True)
+    return sum(v * _derived_matern(p[:, None] - places, length) for v, length in components)
 
 
 def _derived_matern(apart: Array, length: float) -> Array:

@@ -34,19 +34,19 @@ def contradicting_curve(
     others = (curve != numbers[numbers >= 0][:, None]).astype(float)
     k1, k2 = (2.0 * float(posterior.polynomial[i]) for i in (2, 4))  # The terms x^2 and y^2.
     usual = posteriors_of(k1, k2, contacts, others, float(posterior.noise), point_std, by_evidence=False)
-    found = _most_off(contacts, others, usual)
-    if found[0] <= NOTICED:
-        return found
+    most_off = _most_off(contacts, others, usual)
+    if most_off[0] <= NOTICED:
+        return most_off
     return _most_off(contacts, others, posteriors_of(k1, k2, contacts, others, noise, point_std))
 
 
 def _most_off(contacts: Array, others: Array, posteriors: SurfacePosterior) -> tuple[float, float]:
     """The medians for the curve that is off by most deviations, given those of `others` (b, n) for each."""
-    reach, found = np.hypot(contacts[:, 0], contacts[:, 1]), []
+    reach, medians = np.hypot(contacts[:, 0], contacts[:, 1]), []
     for i, weights in enumerate(others):
         own = reach * (weights == 0.0)
         outer, predicted = contacts[own > OUTER * own.max()], posteriors.at(i)
         off = outer[:, 2] - predicted.height(*outer[:, :2].T)
         std = np.hypot(predicted.height_std(*outer[:, :2].T), predicted.noise)
-        found.append((abs(float(np.median(off / std))), abs(float(np.median(off)))))
-    return max(found)
+        medians.append((abs(float(np.median(off / std))), abs(float(np.median(off)))))
+    return max(medians)

@@ -151,8 +151,8 @@ class SurfacePosterior(HeightField):
     def _covariance(self, p: Array, at_p: Array, q: Array, at_q: Array) -> Array:
         """The covariances of heights at p and q, given what `_signed` gives for both."""
         signs = np.repeat([-1.0, 1.0], [len(self.places), len(self.root)])
-        found: Array = (signs * at_p) @ np.swapaxes(at_q, -1, -2)
-        return found + kernel(p, q, self.variances) if len(self.places) else found
+        of_terms: Array = (signs * at_p) @ np.swapaxes(at_q, -1, -2)
+        return of_terms + kernel(p, q, self.variances) if len(self.places) else of_terms
 
     def _signed(self, p: Array) -> Array:
         """Both results of `_whitened` for points (..., n, 2), side by side, (..., n, m + r)."""
@@ -189,11 +189,11 @@ class SurfacePosterior(HeightField):
         if not len(self.places):
             return self.mean
         at, weights = _projection()
-        found: Array = _projected_terms() @ self.mean
-        found += weights @ weighted_kernel(at, self.places, self.variances, self.alpha)
-        mean, half = found[2] + found[4], math.hypot(found[2] - found[4], found[3])
-        found[:FREE] = 0.0, 0.0, 0.5 * (mean - half), 0.0, 0.5 * (mean + half)
-        return found
+        quartic: Array = _projected_terms() @ self.mean
+        quartic += weights @ weighted_kernel(at, self.places, self.variances, self.alpha)
+        mean, half = quartic[2] + quartic[4], math.hypot(quartic[2] - quartic[4], quartic[3])
+        quartic[:FREE] = 0.0, 0.0, 0.5 * (mean - half), 0.0, 0.5 * (mean + half)
+        return quartic
 
     @cached_property
     def covariance(self) -> Array:
@@ -362,8 +362,8 @@ def nodes() -> tuple[Array, Array]:
 def nearest_quartic(mean: Array, alpha: Array, places: Array, variances: Array) -> Array:
     """The terms of degree 1 and 2, (5,), of the quartic nearest to z over QUARTIC_SHARE of the radius."""
     (at, weights), half = _projection(), len(nodes()[1])
-    found: Array = _projected_terms()[:FREE] @ mean
-    return found + weights[:FREE, :half] @ weighted_kernel(at[:half], places, variances, alpha)
+    of_sextic: Array = _projected_terms()[:FREE] @ mean
+    return of_sextic + weights[:FREE, :half] @ weighted_kernel(at[:half], places, variances, alpha)
 
 
 def _rows(x: ArrayLike, y: ArrayLike) -> Array:

@@ -85,18 +85,18 @@ def process_fit(
     posteriors in the new frames and units.
     """
     b, least = len(weights), np.maximum(given.noise, PROCESS_MISFIT)
-    turns, scales, found = np.eye(3)[None].repeat(b, axis=0), np.ones(b), [posterior.at(i) for i in range(b)]
+    turns, scales, fits = np.eye(3)[None].repeat(b, axis=0), np.ones(b), [posterior.at(i) for i in range(b)]
     off, most = np.abs(residuals), np.maximum(posterior.noise, least)
     rms = np.sqrt((weights * off**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0))
     for i in np.flatnonzero(rms > UNEXPLAINED_MISFIT * least):
-        there = np.flatnonzero(weights[i])
+        present = np.flatnonzero(weights[i])
         touch = _with_point(given, weights[i], ranks(int(i)), float(offsets[i]), int(i))
         carried = touch.at_places()
         hyper, use_gp = process_hyperparameters(*carried, float(least[i]), float(most[i]))
-        if not (use_gp or (given.noise_is_known[i] and _is_texture(off[i, there], float(given.noise[i])))):
+        if not (use_gp or (given.noise_is_known[i] and _is_texture(off[i, present], float(given.noise[i])))):
             continue
         if rms[i] <= MISFIT:  # The polynomial averages facets, so its frame is kept.
-            found[i] = replace(process_posterior(touch, hyper, posterior.visibility[i]), sextic=found[i])
+            fits[i] = replace(process_posterior(touch, hyper, posterior.visibility[i]), sextic=fits[i])
             continue
         quartic = nearest_quartic(
             *_mean_given(touch, hyper, *carried), touch.contacts[touch.places, :2], hyper.process
@@ -104,8 +104,8 @@ def process_fit(
         turns[i] = frame_update(np.eye(3), quartic, given.tangent[i])[0]
         scales[i] = np.hypot(*(touch.contacts @ turns[i])[:, :2].T).max()
         hyper = hyper._replace(noise=hyper.noise / scales[i], process=hyper.process / scales[i] ** 2)
-        found[i] = process_posterior(touch.moved(turns[i], scales[i]), hyper, posterior.visibility[i])
-    return turns, scales, found
+        fits[i] = process_posterior(touch.moved(turns[i], scales[i]), hyper, posterior.visibility[i])
+    return turns, scales, fits
 
 
 def _with_point(given: Observations, weights: Array, ranks: NDArray[np.intp], offset: float, i: int) -> Touch:
@@ -113,16 +113,16 @@ def _with_point(given: Observations, weights: Array, ranks: NDArray[np.intp], of
 
     On facets its residual may be as large. weights, ranks : (n,), those of `process_fit`
     """
-    there, point = np.flatnonzero(weights), np.array([[0.0, 0.0, offset]])
+    present, point = np.flatnonzero(weights), np.array([[0.0, 0.0, offset]])
     normals = (
-        given.normals[i] if not given.normals.size else np.vstack([given.normals[i][there], 0.0 * point])
+        given.normals[i] if not given.normals.size else np.vstack([given.normals[i][present], 0.0 * point])
     )
     least = max(given.noise[i], PROCESS_MISFIT)
-    roots = np.sqrt(np.append(weights[there], (least / max(least, given.point_std[i])) ** 2))
-    rank, n = np.append(ranks[there], 0), len(roots)
+    roots = np.sqrt(np.append(weights[present], (least / max(least, given.point_std[i])) ** 2))
+    rank, n = np.append(ranks[present], 0), len(roots)
     # Places are spread on each half of a curve, whichever way it runs and whichever curve is the first.
     places = np.flatnonzero(rank * min(n, MOST_PLACES) % n < MOST_PLACES)
-    return touch_of(np.vstack([given.contacts[i, there], point]), roots, normals, places)
+    return touch_of(np.vstack([given.contacts[i, present], point]), roots, normals, places)
 
 
 def _is_texture(off: Array, noise: float) -> bool:
@@ -141,8 +141,8 @@ def _mean_given(
     rows, kernels : of `at_places`
     """
     if len(touch.normals) or len(touch.places) < len(touch.roots):
-        found = process_posterior(touch, hyper, np.empty(0))
-        return found.mean, found.alpha
+        of_process = process_posterior(touch, hyper, np.empty(0))
+        return of_process.mean, of_process.alpha
     matrix = (rows[:-1].T * hyper.prior) @ rows[:-1]
     matrix += hyper.process[0] * kernels[0] + hyper.process[1] * kernels[1]
     matrix.flat[:: len(matrix) + 1] += hyper.noise**2
@@ -172,9 +172,11 @@ def process_posterior(touch: Touch, hyper: Hyperparameters, visibility: Array) -
     mean = inverse.T @ (inverse @ (features.T @ heights))
     root = np.insert(inverse, terms, 0.0, axis=1)  # The feature 1 has no part: the point is a contact.
     alpha = solved(factor, mean[terms:], transposed=True)
-    found = SurfacePosterior(mean[:terms], root, np.array(hyper.noise), visibility, at, alpha, hyper.process)
-    vars(found)["_places_factor"] = factor  # This saves finding it again.
-    return found
+    posterior = SurfacePosterior(
+        mean[:terms], root, np.array(hyper.noise), visibility, at, alpha, hyper.process
+    )
+    vars(posterior)["_places_factor"] = factor  # This saves finding it again.
+    return posterior
 
 
 def _slopes(touch: Touch, factor: Array, places: Array, variances: Array) -> tuple[Array, Array]:

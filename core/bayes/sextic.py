@@ -102,7 +102,9 @@ def mean_given(data: Sextics, hyper: Hyperparameters) -> Array:
     """The mean of the coefficients less the prior's mean, (b, 27) (Rasmussen and Williams 2006, eq. 2.8)."""
     bordered = data.equations(hyper.noise)
     precision = _with_prior(bordered[:, :-1, :-1].copy(), hyper.prior)
-    return np.array([solved_definite(*each) for each in zip(precision, bordered[:, :-1, -1], strict=True)])
+    return np.array(
+        [solved_definite(*system) for system in zip(precision, bordered[:, :-1, -1], strict=True)]
+    )
 
 
 def with_scatter(data: Sextics, coefficients: Array, normals: Array) -> Sextics:
@@ -121,8 +123,8 @@ def posterior_given(mean: Array, data: Sextics, hyper: Hyperparameters) -> Surfa
     gram = data.equations(hyper.noise)[:, :-1, :-1]
     visibility = _visibility(gram)
     root = np.zeros((len(mean), len(TERMS) + 1, len(TERMS) + 1))
-    for each, precision in zip(root, _with_prior(gram.copy(), hyper.prior), strict=True):
-        each[:-1, :-1] = inverse_lower(cholesky(precision))
+    for factor, precision in zip(root, _with_prior(gram.copy(), hyper.prior), strict=True):
+        factor[:-1, :-1] = inverse_lower(cholesky(precision))
     # Waviness and noise are estimates, so deviations are those of a Student t of this freedom.
     freedom = np.maximum(data.counts - FREE, LEAST_FREEDOM)
     root *= np.sqrt(freedom / (freedom - 2.0))[:, None, None]

@@ -40,10 +40,10 @@ SEPARATORS = re.compile(r"[\s;:=|]+")
 def comments(text: str) -> Iterator[tuple[int, str, int]]:
     """(line number, words without the marks, place of the next line) of each comment."""
     number, place = 1, 0
-    for found in COMMENT.finditer("\n" + text):
-        number += text.count("\n", place, found.start())
-        place = found.start()
-        yield number, found[1].replace('"', " "), found.end()
+    for comment in COMMENT.finditer("\n" + text):
+        number += text.count("\n", place, comment.start())
+        place = comment.start()
+        yield number, comment[1].replace('"', " "), comment.end()
 
 
 def stated(name: str, text: str) -> tuple[str, dict[str, Any]]:

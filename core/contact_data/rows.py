@@ -216,15 +216,15 @@ def contours(
     Raises ValueError with `name` and the curve that Contour refuses.
     """
     order = np.argsort(labels, kind="stable") if times is None else np.lexsort((times, labels))
-    found = []
+    curves = []
     for rows in np.split(order, np.flatnonzero(np.diff(labels[order])) + 1):
         own = None if normals is None or np.isnan(normals[rows[0]]).all() else normals[rows]
         try:
-            found.append(Contour(points[rows], normals=own))
+            curves.append(Contour(points[rows], normals=own))
         except ValueError as error:
             at = f'{name}, curve "{titles[labels[rows[0]]]}"'
             raise ValueError(f"{at}: {error}") from None
-    return found
+    return curves
 
 
 def fields_of(at: str, line: str, separator: str) -> list[str]:

@@ -100,14 +100,14 @@ def _header(name: str, text: str) -> tuple[str, int, int]:
 
     This is the first row, or else the last comment above it that names x, y and z.
     """
-    found = rows.header_of(text)
-    if found is None or not _names_points(found[0]):
-        above = text if found is None else text[: found[2]]
+    header = rows.header_of(text)
+    if header is None or not _names_points(header[0]):
+        above = text if header is None else text[: header[2]]
         titles = [(line, number, end) for number, line, end in comments(above) if _names_points(line)]
-        found = titles[-1] if titles else found
-    if found is None:
+        header = titles[-1] if titles else header
+    if header is None:
         raise ValueError(f"{name}: expected a header with the columns curve, x, y, z, got an empty file")
-    return found
+    return header
 
 
 def _names_points(line: str) -> bool:
@@ -123,10 +123,10 @@ def _separator(header: str) -> str:
 
 def _curve_metadata(contours: list[Contour]) -> dict[str, list[float | None]]:
     """What is known of contours by key: one number for all of them, or one for each."""
-    found = {key: [getattr(contour, key) for contour in contours] for key in CURVE_KEYS}
+    metadata = {key: [getattr(contour, key) for contour in contours] for key in CURVE_KEYS}
     return {
         key: stds[:1] if len(set(stds)) == 1 else stds
-        for key, stds in found.items()
+        for key, stds in metadata.items()
         if any(std is not None for std in stds)
     }
 
@@ -155,7 +155,7 @@ def _with(name: str, contour: Contour, key: str, std: float | None) -> Contour:
 def _columns(at: str, header: list[str]) -> tuple[int, dict[str, int], str]:
     """The number of columns, the place of each known one by name, and the unit of the coordinates."""
     columns: dict[str, int] = {}
-    found: dict[str, str] = {}
+    units: dict[str, str] = {}
     for i, title in enumerate(header):
         key, bracketed, suffix = _name_and_unit(title.lower())
         if key not in COLUMNS:
@@ -163,7 +163,7 @@ def _columns(at: str, header: list[str]) -> tuple[int, dict[str, int], str]:
         if key in POINT_COLUMNS:
             if suffix and spelled(suffix) not in UNIT_METERS:  # Such as x_offset, which is no coordinate.
                 continue
-            found[key] = unit_named(at, bracketed or suffix)
+            units[key] = unit_named(at, bracketed or suffix)
         if key in columns:
             raise ValueError(f'{at}: expected one column "{key}", got two')
         columns[key] = i
@@ -178,7 +178,7 @@ def _columns(at: str, header: list[str]) -> tuple[int, dict[str, int], str]:
             f'{at}: expected the column "{missing[0]}", got "{text}": put commas, semicolons, tabs, "|" or '
             "spaces between the columns curve, x, y, z"
         )
-    used = set(found.values())
+    used = set(units.values())
     if len(used) > 1:
         raise ValueError(f"{at}: expected x, y and z in one unit, got {' and '.join(sorted(used))}")
     return len(header), columns, used.pop()

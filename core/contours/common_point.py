@@ -39,20 +39,20 @@ def common_point(contours: Sequence[ArrayLike | Contour]) -> tuple[Array, Array]
     Raises ValueError for bad arguments, DegenerateCurvesError for curves with fewer than four contacts,
     that do not come near each other, or that run in the same direction where they do.
     """
-    found = contours_of("contours", contours)
-    if len(found) < 2:
+    felt = contours_of("contours", contours)
+    if len(felt) < 2:
         raise DegenerateCurvesError(
-            f"the common point needs two or more curves, got {len(found)}: name the curve of each contact in "
+            f"the common point needs two or more curves, got {len(felt)}: name the curve of each contact in "
             'a column "curve", give more curves, or give the point'
         )
-    for number, contour in enumerate(found, 1):
+    for number, contour in enumerate(felt, 1):
         if (count := len(contour.points)) <= LEAST_CONTACTS:
             raise DegenerateCurvesError(
                 f"curve {number} has {many(count, 'contact', 'contacts')}, and {LEAST_CONTACTS + 1} are "
                 "needed to tell where it runs: measure more, or give the reference point"
             )
-    origin = found[0].points[0]  # Far from the world's origin only differences of points are exact.
-    curves = [Contour(contour.points - origin) for contour in found]
+    origin = felt[0].points[0]  # Far from the world's origin only differences of points are exact.
+    curves = [Contour(contour.points - origin) for contour in felt]
     refined = (_refined(start, curves) for start in _starts(curves))
     point, tangents, misses = min(refined, key=lambda fit: float(np.sum(fit[2] ** 2)))
     _require_near(point, misses, curves)

@@ -149,17 +149,17 @@ class Contour:
 
     def part(self, which: slice | NDArray[Any], stops: tuple[str, str] | None) -> "Contour":
         """The contour of some of its contacts, or of all in another order, which are known to be valid."""
-        found = object.__new__(Contour)
+        shorter = object.__new__(Contour)
         normals = None if self.normals is None else self.normals[which]
-        vars(found).update(vars(self), points=self.points[which], normals=normals, stops=stops)
-        return found
+        vars(shorter).update(vars(self), points=self.points[which], normals=normals, stops=stops)
+        return shorter
 
     def copied(self) -> "Contour":
         """A copy whose arrays cannot be written to."""
-        found = object.__new__(Contour)
+        contour = object.__new__(Contour)
         arrays = {key: read_only(value) for key, value in vars(self).items() if isinstance(value, np.ndarray)}
-        vars(found).update(vars(self) | arrays)
-        return found
+        vars(contour).update(vars(self) | arrays)
+        return contour
 
     def moved(self, scale: float, turn: Array, start: Array, end: Array) -> "Contour":
         """The contour after a similarity of the world that takes the point `start` to `end`, (3,).
@@ -178,13 +178,13 @@ class Contour:
 
 def contours_of(name: str, given: Sequence[ArrayLike | Contour]) -> list[Contour]:
     """The Contours of a list of Contours and arrays (n, 3). Raises ValueError with its `name`."""
-    found = []
-    for i, each in enumerate(list_of(name, given, object)):  # type: ignore[arg-type]
+    contours = []
+    for i, curve in enumerate(list_of(name, given, object)):  # type: ignore[arg-type]
         try:
-            found.append(each if isinstance(each, Contour) else Contour(each))  # type: ignore[arg-type]
+            contours.append(curve if isinstance(curve, Contour) else Contour(curve))  # type: ignore[arg-type]
         except ValueError as error:
             raise ValueError(f"{name}[{i}]: {str(error).removeprefix('points: ')}") from None
-    return found
+    return contours
 
 
 def outward_of(outward: ArrayLike | None, felt: Iterable[object]) -> Array:
@@ -194,7 +194,7 @@ def outward_of(outward: ArrayLike | None, felt: Iterable[object]) -> Array:
     """
     if outward is not None:
         return unit_vector("outward", outward)
-    normals = [each.normals for each in felt if isinstance(each, Contour) and each.normals is not None]
+    normals = [curve.normals for curve in felt if isinstance(curve, Contour) and curve.normals is not None]
     directions = np.vstack([np.empty((0, 3)), *normals])
     mean = unit_vectors("normals", directions[directions.any(axis=1)]).sum(axis=0)
     if not mean.any():
@@ -204,9 +204,9 @@ def outward_of(outward: ArrayLike | None, felt: Iterable[object]) -> Array:
 
 def read_only(array: Array) -> Array:
     """A copy of an array that cannot be written to."""
-    found = array.copy()
-    found.setflags(write=False)
-    return found
+    copy = array.copy()
+    copy.setflags(write=False)
+    return copy
 
 
 def equal_points(points: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

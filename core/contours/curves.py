@@ -84,18 +84,18 @@ def curves_through(r: Array, present: NDArray[np.bool_], normals: Array | None =
 
     s is the chord to the contact, which differs from the arc length only by its cube.
     """
-    shape, each = present.shape, np.arange(present[..., 0].size)
-    r, present, curve = r.reshape(len(each), -1, 3), present.reshape(len(each), -1), each[:, None]
+    shape, rows = present.shape, np.arange(present[..., 0].size)
+    r, present, curve = r.reshape(len(rows), -1, 3), present.reshape(len(rows), -1), rows[:, None]
     distance, off_point = distances_from_point(r)
     present = present & off_point
     far = np.where(present, distance, np.inf)
     near = far.argsort(axis=1, kind="stable")[:, :WINDOW]
     counts = present.sum(axis=1)
-    farthest = near[each, np.minimum(np.maximum(counts, 1), WINDOW) - 1]
-    along = np.copysign(distance, (r @ r[each, farthest, :, None])[..., 0]) * present
+    farthest = near[rows, np.minimum(np.maximum(counts, 1), WINDOW) - 1]
+    along = np.copysign(distance, (r @ r[rows, farthest, :, None])[..., 0]) * present
     given = present.cumsum(axis=1) - 0.5 * (counts + 1)[:, None]
     along[np.einsum("cn,cn->c", given, along) < 0.0] *= -1.0
-    scale = np.where(counts > 0, far[each, farthest], 1.0)[:, None]
+    scale = np.where(counts > 0, far[rows, farthest], 1.0)[:, None]
     tangents, curvatures = _parabola(along[curve, near] / scale, r[curve, near] / scale[..., None])
     # The speed is 1 except for noise.
     speed = np.maximum(np.sqrt(np.einsum("ci,ci->c", tangents, tangents)), 1e-9)[:, None]

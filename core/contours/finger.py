@@ -63,9 +63,9 @@ def first_contact(
     for aside, length in ((e1, 0.0), (e1, 1e-3), (e2, 1e-3), (e1, -1e-3), (e2, -1e-3)):
         contact = section(surface, p, aside, n, 1.0)(complex(length * step, reach), -1j, 2.0 * reach)
         if contact is not None:
-            _, _, found, up = contact
+            _, _, place, up = contact
             side = math.copysign(1.0, dot(up, n))
-            return found, scaled(up, side), side
+            return place, scaled(up, side), side
     raise NoContactError(
         f"point: expected one on the surface, got one with no surface within {reach:.3g} along the normal: "
         "move it onto the surface, or away from a corner"

@@ -127,14 +127,14 @@ def _extended(curve: _Curve, count: int, noise: float, generator: np.random.Gene
 
 def _next_contacts(half: _Half, count: int) -> list[tuple[Vector, Vector]]:
     """The contacts, with normals, by which a half contour grows to `count`, or fewer where it ends."""
-    found: list[tuple[Vector, Vector]] = []
+    contacts: list[tuple[Vector, Vector]] = []
     while half.stop == EXTENT and half.count < count:
         try:
-            found.append(next(half.contacts))
+            contacts.append(next(half.contacts))
             half.count += 1
         except StopIteration as end:
             half.stop = end.value
-    return found
+    return contacts
 
 
 def generator_of(rng: np.random.Generator | int | None) -> np.random.Generator:

@@ -104,26 +104,31 @@ class Touch:
         """The touch, with planes added while they help. They make a patch more certain, not larger."""
         extent, tolerance, method = self.options.extent, self.options.tolerance, self.options.method
         if extent is None:
-            found = yield from self._longest_sure()
+            explored = yield from self._longest_sure()
             if method != "bayes":
-                found = replace(found, result=(yield from _fitted(found.contours)))
+                explored = replace(explored, result=(yield from _fitted(explored.contours)))
         else:
-            found = yield from self._felt(extent / CONTACTS, CONTACTS)
-        found = self._with_taps(found)
-        stds = [found.result.mean_height_std]
-        while tolerance is not None and stds[-1] > tolerance and len(found.planes) < self.options.most_planes:
-            plane, expected = suggest_plane(found.result, self.reference[:, 1], self.reference[:, 0])
+            explored = yield from self._felt(extent / CONTACTS, CONTACTS)
+        explored = self._with_taps(explored)
+        stds = [explored.result.mean_height_std]
+        while (
+            tolerance is not None and stds[-1] > tolerance and len(explored.planes) < self.options.most_planes
+        ):
+            plane, expected = suggest_plane(explored.result, self.reference[:, 1], self.reference[:, 0])
             if expected > (1.0 - HELPS) * stds[-1]:
                 break
             try:
-                more = yield from self._with_plane(found, plane)
+                more = yield from self._with_plane(explored, plane)
             except ValueError:  # Nothing can be felt along that plane. What was felt so far stays.
                 break
-            if found.result.status == "ok" != more.result.status or more.result.mean_height_std >= stds[-1]:
+            if (
+                explored.result.status == "ok" != more.result.status
+                or more.result.mean_height_std >= stds[-1]
+            ):
                 break
-            found = more
-            stds.append(found.result.mean_height_std)
-        return replace(found, stds=tuple(stds))
+            explored = more
+            stds.append(explored.result.mean_height_std)
+        return replace(explored, stds=tuple(stds))
 
     def _longest_sure(self) -> Steps:
         """The touch of the longest half curves whose patch is sure, or else the most certain of all."""
@@ -131,14 +136,16 @@ class Touch:
         error = None
         for step, count in self._in_order():
             try:
-                found = yield from self._felt(step, count)
+                explored = yield from self._felt(step, count)
             except DegenerateCurvesError as why:
                 error = error or why
                 continue
-            if _is_sure(found, self.options) and _is_sure(found := self._with_taps(found), self.options):
-                return found
-            tried.append(found)
-            r = found.result
+            if _is_sure(explored, self.options):
+                explored = self._with_taps(explored)
+                if _is_sure(explored, self.options):
+                    return explored
+            tried.append(explored)
+            r = explored.result
             if r.mean_height_std > DOUBTFUL_STD * r.radius and not suffices(r):
                 break  # Noise leaves shorter half curves even less certain.
         if error is not None and not tried:

@@ -21,12 +21,12 @@ def planes_of(planes: int | Sequence[SamplingPlane]) -> tuple[SamplingPlane, ...
     """This many evenly spread planes, or the planes that are given. Raises ValueError for neither."""
     if isinstance(planes, int | np.integer):
         is_possible = 3 <= planes <= MOST_EVEN
-        found = tuple(SamplingPlane(math.pi * i / planes) for i in range(planes)) if is_possible else ()
+        chosen = tuple(SamplingPlane(math.pi * i / planes) for i in range(planes)) if is_possible else ()
     else:
-        found = tuple(list_of("planes", planes, SamplingPlane))
-    if not found:
+        chosen = tuple(list_of("planes", planes, SamplingPlane))
+    if not chosen:
         raise ValueError(f"planes: expected 3 to {MOST_EVEN}, or sampling planes, got {planes}")
-    return found
+    return chosen
 
 
 @dataclass(frozen=True, eq=False)

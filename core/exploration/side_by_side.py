@@ -139,7 +139,7 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
 
     Yields after each contour and each stack.
     """
-    found: dict[int, Exploration | ValueError] = {}
+    explored: dict[int, Exploration | ValueError] = {}
     answers: dict[int, Answer | None] = dict.fromkeys(range(len(steps)))
     while answers:
         requests: dict[int, Request] = {}
@@ -147,9 +147,9 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
             try:
                 requests[i] = steps[i].send(answer)  # type: ignore[arg-type]
             except StopIteration as end:
-                found[i] = end.value
+                explored[i] = end.value
             except ValueError as error:
-                found[i] = error
+                explored[i] = error
             yield
         answers = {}
         for method in dict.fromkeys(("bayes", fit.method)):
@@ -160,4 +160,4 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
                 results = fitted(points[which], touches, outward[which], options)
                 answers.update(zip(which, results, strict=True))
                 yield
-    return [found[i] for i in range(len(steps))]
+    return [explored[i] for i in range(len(steps))]

@@ -107,8 +107,8 @@ def _lattice(domain: Domain, size: Size, rim: Array, finest: float) -> Array:
     reach = np.ceil(np.abs(rim).max(axis=0) / (0.5 * side, row)).astype(int)
     i, j = (n.ravel() for n in np.meshgrid(*(np.arange(-most, most + 1) for most in reach)))
     points = np.column_stack([0.5 * side * i, row * j])
-    there = ((i + j) % 2 == 0) & domain.contains(*points.T)
-    i, j, points = i[there], j[there], points[there]
+    is_inside = ((i + j) % 2 == 0) & domain.contains(*points.T)
+    i, j, points = i[is_inside], j[is_inside], points[is_inside]
     # The coarsest lattice that has a point is wider by the power of two in the point's place.
     place = np.gcd((i - j) // 2, j)
     wide = np.where(place == 0, MOST_RIM_EDGES, place & -place) * side

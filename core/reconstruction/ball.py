@@ -86,12 +86,12 @@ def _require_reached(centers: Reconstruction, contour: Contour) -> None:
     order = np.argsort(local[:, :2] @ way, kind="stable")
     s, z = (local[:, :2] @ way)[order], local[order, 2]
     count = max(SIDE, len(s) // SIDES)
-    found = []
+    bends = []
     for i in range(count, len(s) - count + 1):
         middle = 0.5 * (s[i - 1] + s[i])
         before, after = (_slope(s[j : j + count] - middle, z[j : j + count]) for j in (i - count, i))
-        found.append([i, after[0] - before[0], np.hypot(before[1], after[1]), before[2], after[2]])
-    places, jumps, levers, *off = np.array(found).reshape(-1, 5).T
+        bends.append([i, after[0] - before[0], np.hypot(before[1], after[1]), before[2], after[2]])
+    places, jumps, levers, *off = np.array(bends).reshape(-1, 5).T
     if len(jumps) == 0:
         return
     noise = max(float(np.median(off)), contour.noise or 0.0)
@@ -108,6 +108,6 @@ def _slope(s: Array, z: Array) -> tuple[float, float, float]:
     """The slope at 0 of the parabola through z (n,) at s (n,), its deviation per noise, and the noise."""
     basis = np.vander(s, 3)
     inverse = np.linalg.pinv(basis)
-    found = inverse @ z
-    off = float(np.linalg.norm(z - basis @ found)) / np.sqrt(len(s) - 3.0)
-    return float(found[1]), float(np.linalg.norm(inverse[1])), off
+    cubic = inverse @ z
+    off = float(np.linalg.norm(z - basis @ cubic)) / np.sqrt(len(s) - 3.0)
+    return float(cubic[1]), float(np.linalg.norm(inverse[1])), off

@@ -109,16 +109,16 @@ def reconstruct_many(
     given_up = [None] * len(p) if outward is None else finite_array("outward", outward, (len(p), 3))
     up = np.array([outward_of(u, [*c, *s]) for u, c, s in zip(given_up, felt, strokes, strict=True)])
     up = up.reshape(-1, 3)
-    found: dict[int, Reconstruction | DegenerateCurvesError] = {}
+    results: dict[int, Reconstruction | DegenerateCurvesError] = {}
     touches, places = {}, p.copy()
     for i, (c, s) in enumerate(zip(felt, strokes, strict=True)):
         try:
             places[i], touches[i] = _touch(p[i], c, s, up[i], fit)
         except DegenerateCurvesError as error:
-            found[i] = error
-    each = list(touches)
-    found.update(zip(each, fitted(places[each], list(touches.values()), up[each], fit), strict=True))
-    return [found[i] for i in range(len(p))]
+            results[i] = error
+    which = list(touches)
+    results.update(zip(which, fitted(places[which], list(touches.values()), up[which], fit), strict=True))
+    return [results[i] for i in range(len(p))]
 
 
 def fitted(
@@ -136,8 +136,8 @@ def fitted(
         while order:
             count = max(1, STACK // max(sizes[order[0]], 1))
             chosen, order = order[:count], order[count:]
-            found = fitted_stack(points[chosen], [touches[i] for i in chosen], outward[chosen], options)
-            results.update(zip(chosen, found, strict=True))
+            of_size = fitted_stack(points[chosen], [touches[i] for i in chosen], outward[chosen], options)
+            results.update(zip(chosen, of_size, strict=True))
     return [results[i] for i in range(len(touches))]
 
 
@@ -168,11 +168,11 @@ def _fitted_one(p: Array, touch: Given, up: Array, options: FitOptions) -> Recon
 
 def _given(contours: list[Contour], strokes: Sequence[ArrayLike | Contour], options: FitOptions) -> Given:
     """The contacts of a touch. Raises ValueError for strokes or a radius that do not go with the options."""
-    found = Given(contours, *gathered(strokes, contours))
-    if len(found.strokes) and options.method != "bayes":
+    given = Given(contours, *gathered(strokes, contours))
+    if len(given.strokes) and options.method != "bayes":
         raise ValueError(
             f'strokes: expected none with "{options.method}", which fits contours only: use "bayes"'
         )
     if contours and options.radius is not None:
         raise ValueError("radius: expected none with contours, which say how far the patch reaches")
-    return found
+    return given

@@ -114,8 +114,8 @@ class Reconstruction(Judged):
     @cached_property
     def contacts(self) -> Array:
         """The fitted contacts besides the reference point, (n, 3), in the frame."""
-        each = zip(self.contours, self._off_point, strict=True)
-        points = np.concatenate([*(contour.points[off] for contour, off in each), self.strokes])
+        curves = zip(self.contours, self._off_point, strict=True)
+        points = np.concatenate([*(contour.points[off] for contour, off in curves), self.strokes])
         return self.frame.to_local(points)
 
     @cached_property
@@ -237,13 +237,13 @@ class Reconstruction(Judged):
         A fit without a process takes the errors of contacts for independent, which those that share a bend
         are not. A patch by another method also departs from the posterior's mean.
         """
-        posterior, found = self.posterior, self.posterior.covariance[2:FREE, 2:FREE]
+        posterior, covariance = self.posterior, self.posterior.covariance[2:FREE, 2:FREE]
         if not (posterior.sextic or posterior).amplitude:
-            found = self.bends.contacts**2 * found  # benchmarks.curvatures: scans, facets
+            covariance = self.bends.contacts**2 * covariance  # benchmarks.curvatures: scans, facets
         if self.method != "bayes":
             off = posterior.polynomial[2:FREE] - coefficients_of(self.patch.scaled(1.0 / self.radius))[2:FREE]
-            found = found + np.outer(off, off)
-        return found
+            covariance = covariance + np.outer(off, off)
+        return covariance
 
     @property
     def _off_shape(self) -> list[float]:

@@ -101,9 +101,9 @@ def _with_processes(
     stds = {"noise": given.noise / farthest, "point_std": given.point_std / farthest}
     given = given._replace(contacts=contacts, **stds)
     residuals, posteriors = residuals / farthest[:, None] - offset[:, None], posteriors.scaled(1.0 / farthest)
-    turns, scales, found = process_fit(given, weights, posteriors, residuals, start.ranks, -offset)
+    turns, scales, processes = process_fit(given, weights, posteriors, residuals, start.ranks, -offset)
     contacts = contacts @ turns / scales[:, None, None]
-    return _Fit(points, axes @ turns, radii * farthest * scales, contacts, fit.degrees, found)
+    return _Fit(points, axes @ turns, radii * farthest * scales, contacts, fit.degrees, processes)
 
 
 def _observations(start: Start, axes: Array, radii: Array, contacts: Array) -> Observations:

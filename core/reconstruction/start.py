@@ -82,11 +82,11 @@ class Start(NamedTuple):
         """Contacts (b, n, 3) of curves, then strokes, in the axes and in unit radius; a mask (b, n)."""
         b, most = len(self.points), max(map(len, self.strokes))
         local = (self.curves.points @ self.axes[:, None] / self.radii[:, None, None, None]).reshape(b, -1, 3)
-        strokes, there = np.zeros((b, most, 3)), np.zeros((b, most), dtype=bool)
+        strokes, is_stroke = np.zeros((b, most, 3)), np.zeros((b, most), dtype=bool)
         for i, stroke in enumerate(self.strokes):
-            strokes[i, : len(stroke)], there[i, : len(stroke)] = stroke, True
+            strokes[i, : len(stroke)], is_stroke[i, : len(stroke)] = stroke, True
         present = self.curves.present.reshape(b, -1)
-        return np.concatenate([local, strokes], axis=1), np.concatenate([present, there], axis=1)
+        return np.concatenate([local, strokes], axis=1), np.concatenate([present, is_stroke], axis=1)
 
     def ranks(self, i: int) -> NDArray[np.intp]:
         """How many of touch i are farther out on the same half curve, or before it in the strokes, (n,)."""
@@ -127,12 +127,12 @@ def _start(
     """
     axes, kappas, radii = darboux_frames(curves, normals)
     strokes, stds, known, point_stds = [], [], [], []
-    for i, (point, touch, each) in enumerate(zip(points, given, thin, strict=True)):
-        contours = [contour for contour, _ in each]
+    for i, (point, touch, thin_curves) in enumerate(zip(points, given, thin, strict=True)):
+        contours = [contour for contour, _ in thin_curves]
         contacts, size = _stroke_means(curves.at(i), contours, axes[i], radii[i], point, touch)
         noises = [*(c.noise or 0.0 for c in contours), touch.noise / math.sqrt(size)]
         strokes.append(contacts)
-        stds.append(_std(options.noise, max(size, min(number for _, number in each)), noises))
+        stds.append(_std(options.noise, max(size, min(number for _, number in thin_curves)), noises))
         has_noise = options.noise is not None or None not in [c.noise for c in contours]
         known.append(not len(contacts) and has_noise)
         point_stds.append(_point_std(point, touch.contours, options, radii[i]))
@@ -145,11 +145,11 @@ def _errors(
     points: Array, touches: list[list[Contour]], curves: Curves, normals: Array
 ) -> list[DegenerateCurvesError | None]:
     """Why each touch with these curves and normals (b, 3) carries no frame, or None."""
-    each = zip(touches, curves.present, curves.tangents, normals, strict=True)
+    with_curves = zip(touches, curves.present, curves.tangents, normals, strict=True)
     apart, reach = np.spacing(np.abs(points)).max(axis=1), np.abs(curves.points).max(axis=(1, 2, 3))
     errors = [
         degeneracy(*touch) or (too_coarse(gap, size) if gap > TOUCH_ROUNDING * size else None)
-        for touch, gap, size in zip(each, apart, reach, strict=True)
+        for touch, gap, size in zip(with_curves, apart, reach, strict=True)
     ]
     return [
         error and (away_from(point, contours) or error)
@@ -165,10 +165,10 @@ def away_from(point: Array, contours: Sequence[Contour]) -> DegenerateCurvesErro
     """
     if len(contours) < 3 or min(len(contour.points) for contour in contours) <= LEAST_CONTACTS:
         return None
-    found = misses(curves_through(*stacked(point[None], [contours])))[0, :, 0]
+    distances = misses(curves_through(*stacked(point[None], [contours])))[0, :, 0]
     away = [
         miss if min(contour.distance_to(point), miss) > AWAY * contour.size else 0.0
-        for miss, contour in zip(found, contours, strict=True)
+        for miss, contour in zip(distances, contours, strict=True)
     ]
     worst = int(np.argmax(away))
     if not away[worst]:
@@ -263,8 +263,8 @@ def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
     """
     last = np.maximum(curves.present.sum(axis=1) - 1, 0)
     rows, ahead = np.arange(len(last)), curves.tangents[:, :2]
-    there = curves.present[:, 0]
-    sides = np.array([there & (curves.along[:, 0] < 0.0), there & (curves.along[rows, last] > 0.0)])
+    present = curves.present[:, 0]
+    sides = np.array([present & (curves.along[:, 0] < 0.0), present & (curves.along[rows, last] > 0.0)])
     ends = np.array([curves.points[rows, 0, :2], curves.points[rows, last, :2]])
     open_ends = np.zeros_like(sides)
     for i, contour in enumerate(contours):

@@ -107,9 +107,9 @@ def means(contacts: Array, along: Array, when: NDArray[np.intp]) -> tuple[Array,
     # Singular values of the contacts are roots of those of their normal equations.
     quartic = np.linalg.pinv(basis.T @ basis, rcond=OPEN**2, hermitian=True) @ (basis.T @ over[:, 2])
     over[:, 2] -= basis @ quartic
-    found: Array = np.add.reduceat(over, starts, axis=0) / counts
-    found[:, 2] += monomials(found[:, :2] @ turn, QUARTIC) @ quartic
-    return found, int(counts.min())
+    averages: Array = np.add.reduceat(over, starts, axis=0) / counts
+    averages[:, 2] += monomials(averages[:, :2] @ turn, QUARTIC) @ quartic
+    return averages, int(counts.min())
 
 
 def _groups(flat: Array, along: Array, strips: int) -> NDArray[np.intp]:
@@ -135,9 +135,9 @@ def _equal(shares: Array, order: NDArray[np.intp], within: NDArray[np.intp], par
     passed = np.cumsum(shares[order]) - 0.5 * shares[order]
     totals = np.bincount(within, shares)
     passed -= (np.cumsum(totals) - totals)[within[order]]
-    found = np.empty(len(order), dtype=np.intp)
-    found[order] = np.clip(parts * passed / totals[within[order]], 0, parts - 1)
-    return found
+    part_of = np.empty(len(order), dtype=np.intp)
+    part_of[order] = np.clip(parts * passed / totals[within[order]], 0, parts - 1)
+    return part_of
 
 
 def first_frame(r: Array, outward: Array, radius: float | None) -> FirstFrame | DegenerateCurvesError:
@@ -214,5 +214,5 @@ def _quadric(local: Array) -> Array | None:
     basis = monomials(local, QUADRIC)
     if len(basis) < len(QUADRIC):
         return None
-    found, _, _, singular = np.linalg.lstsq(basis, local[:, 2], rcond=None)
-    return None if singular[-1] < DETERMINED * math.sqrt(len(basis)) else found
+    coefficients, _, _, singular = np.linalg.lstsq(basis, local[:, 2], rcond=None)
+    return None if singular[-1] < DETERMINED * math.sqrt(len(basis)) else coefficients

@@ -126,9 +126,9 @@ def _fields(mesh: ScanMesh, reach: float) -> tuple[Array, Array]:
     tree, nearest, fields = cKDTree(co[:-1]), range(1, min(MOST_POINTS, len(points)) + 1), []
     for part in np.array_split(places, math.ceil(len(places) / 500)):
         axes, origins = part[..., :3], part[..., 3]
-        found = tree.query(origins, nearest, distance_upper_bound=reach)[1]
-        local = (co[found] - origins[:, None]) @ axes
-        weights = np.maximum(normals[found] @ axes[..., 2:], 0.0)
+        neighbors = tree.query(origins, nearest, distance_upper_bound=reach)[1]
+        local = (co[neighbors] - origins[:, None]) @ axes
+        weights = np.maximum(normals[neighbors] @ axes[..., 2:], 0.0)
         basis = weights * monomials(local, QUARTIC)
         system = basis.swapaxes(1, 2) @ basis + POLYNOMIAL_RIDGE * np.eye(len(QUARTIC))
         fields.append(np.linalg.solve(system, basis.swapaxes(1, 2) @ (weights * local)[..., 2:])[..., 0])
@@ -174,12 +174,12 @@ def _registered(
         moved = places[going]
         moved[..., :3] = Rotation.from_rotvec(step[:, :3]).as_matrix() @ moved[..., :3]
         moved[..., 3] += step[:, 3:]
-        found, slope = mesh_distances(moved, oriented, mesh, neighbors)
+        errors, slope = mesh_distances(moved, oriented, mesh, neighbors)
         before = np.sum(off**2, axis=(1, 2))
-        gain = before - np.sum(found**2, axis=(1, 2))
+        gain = before - np.sum(errors**2, axis=(1, 2))
         better = gain > 0.0
         which = going[better]
-        places[which], distances[which], slopes[which] = moved[better], found[better], slope[better]
+        places[which], distances[which], slopes[which] = moved[better], errors[better], slope[better]
         damping[going] *= np.where(better, 0.2, 5.0)[:, None, None]
         going = going[~better | (gain > SETTLED_GAIN * before)]
         if not len(going):
@@ -192,10 +192,10 @@ def _registered(
 
 def _distinct(places: Array, residuals: Array) -> list[int]:
     """The indices of places that differ from each other, the best first."""
-    found: list[int] = []
+    distinct: list[int] = []
     for i in np.argsort(residuals).tolist():
-        far = np.linalg.norm(places[found, :, 3] - places[i, :, 3], axis=1) > SAME_PLACE
-        trace = np.einsum("mij,ij->m", places[found, :, :3], places[i, :, :3])
+        far = np.linalg.norm(places[distinct, :, 3] - places[i, :, 3], axis=1) > SAME_PLACE
+        trace = np.einsum("mij,ij->m", places[distinct, :, :3], places[i, :, :3])
         if (far | (trace < 1.0 + 2.0 * math.cos(SAME_TURN))).all():
-            found.append(i)
-    return found
+            distinct.append(i)
+    return distinct

@@ -33,8 +33,8 @@ def reachable(geometry: Geometry, surface: Surface, vertices: ArrayLike) -> NDAr
     """
     points = np.asarray(vertices)
     starts = range(0, len(points), POINTS_AT_ONCE)
-    found = [i + _reachable(geometry, surface, points[i : i + POINTS_AT_ONCE]) for i in starts]
-    return np.concatenate([np.empty(0, dtype=np.intp), *found])
+    indices = [i + _reachable(geometry, surface, points[i : i + POINTS_AT_ONCE]) for i in starts]
+    return np.concatenate([np.empty(0, dtype=np.intp), *indices])
 
 
 def _reachable(geometry: Geometry, surface: Surface, points: Array) -> NDArray[np.intp]:
@@ -74,8 +74,8 @@ def verify(
 
     Raises ValueError for bad numbers.
     """
-    *_, found = verifying(r, surface, vertices, extra=extra)
-    return found
+    *_, numbers = verifying(r, surface, vertices, extra=extra)
+    return numbers
 
 
 def verifying(
@@ -83,27 +83,27 @@ def verifying(
 ) -> Iterator[dict[str, float]]:
     """`verify` in short steps: each yields the measures so far, and the last one all."""
     local = r.frame.to_local(finite_array("vertices", vertices, (None, 3)))
-    found: dict[str, float] = {"contacts": len(r.contacts), "vertices": len(local)}
-    found |= _spread("contact", distances(r.geometry, r.contacts))
+    numbers: dict[str, float] = {"contacts": len(r.contacts), "vertices": len(local)}
+    numbers |= _spread("contact", distances(r.geometry, r.contacts))
     offsets = np.empty(len(local))
     for start in range(0, len(local), VERTICES_AT_ONCE):
         some = slice(start, start + VERTICES_AT_ONCE)
         offsets[some] = distances(r.geometry, local[some])
-        yield found
+        yield numbers
     contours = _extra_contours(r, surface, extra)
     points = np.concatenate([np.empty((0, 3)), *contours])
-    found |= {
+    numbers |= {
         **_spread("vertex", offsets),
         "fit_error": r.fit_error,
         "extra_contours": sum(len(contour) > 0 for contour in contours),
         "extra_points": len(points),
         "total_absolute_curvature": r.total_absolute_curvature,
     }
-    yield found
-    found["overlap"] = _overlap(r, surface)
+    yield numbers
+    numbers["overlap"] = _overlap(r, surface)
     if len(points):
-        found["extra_fit_error"] = fit_error(r.geometry, points)
-    yield found
+        numbers["extra_fit_error"] = fit_error(r.geometry, points)
+    yield numbers
 
 
 def _spread(name: str, offsets: Array) -> dict[str, float]:
