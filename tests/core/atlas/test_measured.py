@@ -246,6 +246,14 @@ def test_edges_that_no_contact_is_near_are_a_doubt_that_names_one():
     assert len(atlas.unexplained) > 1  # A finger may miss the first.
 
 
+def test_where_patches_lie_contacts_may_be_far_apart():
+    points = ball(80)
+    atlas = core.atlas_of([core.Contour(points, normals=points)])
+    assert atlas.status == "ok"
+    off = np.linalg.norm(atlas.reference.mesh.vertices, axis=1) - 1.0
+    assert np.abs(off).max() < measured.MOST_OFF * np.ptp(points, axis=0).max()
+
+
 @pytest.mark.parametrize("spacing", [0.05, 0.1])
 def test_patches_go_on_to_edges_and_corners_that_contacts_are_near(spacing):
     atlas = core.atlas_of([cube(spacing, 0.5 * spacing)], noise=1e-3)
