@@ -240,8 +240,8 @@ def _draw_more(
     _draw_range(context, layout, patch)
     for i, words in enumerate(reasons(record)):
         draw_sentence(context, layout, words, "BLANK1" if i else ICONS.get(record["status"], "ERROR"))
-    rows = [*other_rows(record, unit), *plane_rows(record, unit)]
-    draw_rows(context, layout, rows, active=is_current)
+    for rows in (other_rows(record, unit), plane_rows(record, unit)):  # The labels of planes are long.
+        draw_rows(context, layout, rows, active=is_current)
     if probe.probe_of(patch) is not None:
         layout.operator("tactile.verify", icon="VIEWZOOM")
 
