@@ -39,7 +39,7 @@ REASONS = {
     "facets": Reason(
         "The facets here make ± {percent:.0f} % of the curvature, which is that of the facets, not of the "
         "shape",
-        ("add a Subdivision modifier if the mesh stands for a smooth shape",),
+        ("add a Subdivision modifier if the shape is smooth",),
     ),
     "taps": Reason(
         "Between the curves the surface is up to {percent:.2g} % of the radius off the patch, perhaps at an "

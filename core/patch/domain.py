@@ -122,6 +122,14 @@ class Domain:
         radii: Array = PchipInterpolator(at, np.tile(reach, 4))(azimuths)
         return 2.0 * np.pi * azimuths, radii
 
+    @property
+    def corners(self) -> Array:
+        """The ends (k, 2) at which the boundary has a corner: those next to straight pieces."""
+        if self.open_ends is None or self._turns_back:
+            return np.empty((0, 2))
+        straight = self.open_ends | np.roll(self.open_ends, -1)  # pieces, each from its end to the next
+        return self.ends[straight | np.roll(straight, 1)]
+
     @cached_property
     def nodes(self) -> tuple[Array, Array]:
         """Gauss points (n, 2) and weights (n,) of sum 1 for the mean of a function over the domain, n = 12 m.

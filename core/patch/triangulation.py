@@ -80,21 +80,38 @@ def _chord_error_scale(surface: HeightField, points: Array) -> Array:
 
 
 def _rim(domain: Domain, size: Size, off: float) -> tuple[Array, float]:
-    """Points (n, 2) on the boundary with equal distances along it, and the least size in the domain."""
-    closed = domain.boundary(8 * RIM_SAMPLES)[np.arange(8 * RIM_SAMPLES + 1) % (8 * RIM_SAMPLES)]
+    """Points (n, 2) on the boundary, even between its corners, and the least size in the domain."""
+    places = 8 * RIM_SAMPLES
+    closed = domain.boundary(places)[np.arange(places + 1) % places]
     lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
+    corners = domain.corners
+    turns = np.arctan2(corners[:, 1], corners[:, 0]) / (2.0 * np.pi) % 1.0
+    bends = np.interp(places * turns, np.arange(places + 1), lengths)  # where along the boundary corners are
 
-    def around(count: int) -> Array:
-        """The points (count, 2) of the boundary in `count` equal steps."""
-        at = lengths[-1] / count * np.arange(count)
-        return np.column_stack([np.interp(at, lengths, values) for values in closed.T])
+    def around(at: Array) -> Array:
+        """The points of the boundary at these lengths along it."""
+        return np.column_stack([np.interp(at % lengths[-1], lengths, values) for values in closed.T])
 
-    samples = around(RIM_SAMPLES)
-    sagitta = 0.5 * np.hypot(*(np.roll(samples, 1, 0) - 2.0 * samples + np.roll(samples, -1, 0)).T).max()
+    between = lengths[-1] / RIM_SAMPLES
+    along = between * np.arange(RIM_SAMPLES)
+    samples = around(along)
+    second = np.hypot(*(np.roll(samples, 1, 0) - 2.0 * samples + np.roll(samples, -1, 0)).T)
+    to_corner = np.abs((along[:, None] - bends + 0.5 * lengths[-1]) % lengths[-1] - 0.5 * lengths[-1])
+    sagitta = 0.5 * second[(to_corner > between).all(axis=1)].max(initial=0.0)
     rings = np.arange(5)[:, None, None] / 4.0 * samples
     sizes = size(rings.reshape(-1, 2)).reshape(5, RIM_SAMPLES)
     bound = max(RIM_SAMPLES / 2.0 * math.sqrt(sagitta / off), lengths[-1] / (RIM_SPACING * sizes[-1].min()))
-    return around(4 * math.ceil(min(bound, MOST_RIM_EDGES) / 4.0)), float(sizes.min())
+    count = 4 * math.ceil(min(bound, MOST_RIM_EDGES) / 4.0)
+    if not len(corners):
+        return around(lengths[-1] / count * np.arange(count)), float(sizes.min())
+    order = np.argsort(bends)
+    bends, pieces = bends[order], []
+    for corner, start, end in zip(corners[order], bends, [*bends[1:], bends[0] + lengths[-1]], strict=True):
+        share = count * (end - start) / lengths[-1]
+        edges = 2 * math.ceil(0.5 * share - 1e-6) if share > 1.0 else 1  # If even, none is across an axis.
+        steps = start + (end - start) / edges * np.arange(1, edges)
+        pieces += [corner[None], around(steps)]
+    return np.vstack(pieces), float(sizes.min())
 
 
 def _lattice(domain: Domain, size: Size, rim: Array, finest: float) -> Array:

@@ -51,6 +51,7 @@ class InSlices(OperatorMixin):
     stop = "Stop"  # What Esc does,
     stopped = "Stopped: the patch stays as it was"  # and what is reported then.
     meanwhile = {"RUNNING_MODAL"}  # What modal() returns for all other events.
+    section = "object"  # The part of the panel that shows how far it is: "object" or "map".
     shown: tuple[str, ...] = ()  # The settings in its dialog; "target" is the name of an object.
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
@@ -185,9 +186,14 @@ class TACTILE_OT_stop(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def draw_running(layout: bpy.types.UILayout) -> None:
-    """Draws how far the latest operator is that runs in slices, and a button that stops it; or nothing."""
+def draw_running(layout: bpy.types.UILayout, section: str | None = None) -> None:
+    """Draws how far the latest operator is that runs in slices, and a button that stops it; or nothing.
+
+    section : the part of the panel that is drawn, which leaves the operators of others out
+    """
     for operator in _running[-1:]:
+        if section not in (None, operator.section):
+            continue
         words, share = operator._said()
         layout.progress(factor=share or 0.0, text=words, translate=False)
         layout.operator(TACTILE_OT_stop.bl_idname, text=operator.stop, icon="EVENT_ESC")

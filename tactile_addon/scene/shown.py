@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How patches and whole objects are shown: their colors, with one range for each quantity and mesh.
 
-The range follows from how much the mesh bends at the points that were touched, as far as that is certain.
-Rims, where patches are least certain, do not count. Lengths have the range of what is promised of them.
+The range follows from how much the mesh bends at the points that were touched, as far as that is certain;
+if nothing is, from how uncertain it is. Rims, where patches are least certain, do not count. Lengths have the
+range of what is promised of them.
 """
 
 import math
@@ -73,11 +74,15 @@ def bend_range(bends: ArrayLike, areas: ArrayLike, size: float) -> float:
 
 
 def _bend(records: Iterable[Mapping[str, Any]]) -> float:
-    """The range of the curvatures of patches, by what is certain of those at their points."""
+    """The range of the curvatures of patches, by what is certain of those at their points.
+
+    It is no smaller than the error of the patch that is known best, so that what may as well be 0 is pale.
+    """
     records = list(records)
     bends = [max(abs(r[k]) - r[f"{k}_std"] for k in ("k1", "k2")) for r in records]
+    least = min(max(r["k1_std"], r["k2_std"]) for r in records)
     areas = [r["radius"] ** 2 for r in records]
-    return bend_range(np.maximum(bends, 0.0), areas, records[0].get("object_size", records[0]["radius"]))
+    return bend_range(np.maximum(bends, least), areas, records[0].get("object_size", records[0]["radius"]))
 
 
 def _bend_of_surface(obj: Object) -> float:

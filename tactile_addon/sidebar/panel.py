@@ -166,7 +166,7 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
 
     def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
         layout.operator("tactile.touch_all_over", icon="MESH_UVSPHERE")
-        draw_running(layout)
+        draw_running(layout, "object")
         if obj is None or patch_record.ATLAS_RECORD not in obj:
             return
         record = obj[patch_record.ATLAS_RECORD]
@@ -196,6 +196,7 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
 
     def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
         layout.operator("tactile.stability_map", icon="SHADERFX")
+        draw_running(layout, "map")
         if obj is None or patch_record.MAP_RECORD not in obj:
             return
         layout.operator("tactile.pick", text="Probe on the Map", icon="EYEDROPPER").new = True
@@ -240,8 +241,8 @@ def _draw_more(
     _draw_range(context, layout, patch)
     for i, words in enumerate(reasons(record)):
         draw_sentence(context, layout, words, "BLANK1" if i else ICONS.get(record["status"], "ERROR"))
-    rows = [*other_rows(record, unit), *plane_rows(record, unit)]
-    draw_rows(context, layout, rows, active=is_current)
+    for rows in (other_rows(record, unit), plane_rows(record, unit)):  # The labels of planes are long.
+        draw_rows(context, layout, rows, active=is_current)
     if probe.probe_of(patch) is not None:
         layout.operator("tactile.verify", icon="VIEWZOOM")
 

@@ -95,7 +95,7 @@ def draw_rows(
     A value that has no room to the right of its label stands below it.
     """
     longest = max((len(label) for label, _ in rows), default=0)
-    share = min(max((longest + 3) / _letters(context), 0.34), 0.66)
+    share = min(max((longest + 4) / _letters(context), 0.34), 0.66)
     room = (1.0 - share) * _letters(context) * LETTER - PADDING
     blf.size(FONT, TEXT)
     column = layout.column(align=True)

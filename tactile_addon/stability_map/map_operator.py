@@ -29,7 +29,7 @@ class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
         "object's size where the extent is automatic",
     )
 
-    stop = "Stop and Keep"
+    stop, section = "Stop and Keep", "map"
     shown = ("target", "spacing", "extent", "noise", "seed")  # All else is as the active probe has it.
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:

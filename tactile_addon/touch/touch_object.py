@@ -137,7 +137,7 @@ def _explored(
             raise
         raise ValueError(
             f"{error}. The facets there are {length(facet)} long: add a Subdivision modifier if the "
-            "mesh stands for a smooth shape"
+            "shape is smooth"
         ) from error
 
 

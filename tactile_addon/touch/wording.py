@@ -136,8 +136,10 @@ def fit_summary(report: TouchReport) -> str:
 
 
 def curvatures(report: Mapping[str, Any], unit: Unit) -> str:
-    """Both principal curvatures in words, without their standard deviations."""
-    return " and ".join(say(known(report[key], report[f"{key}_std"]), -1, unit) for key in ("k1", "k2"))
+    """Both principal curvatures in words, without their standard deviations, such as "-2 and 0.5 1/m"."""
+    first, second = (say(known(report[key], report[f"{key}_std"]), -1, unit) for key in ("k1", "k2"))
+    shared = second.partition(" ")[2]
+    return f"{first.removesuffix(f' {shared}')} and {second}"
 
 
 def _verification(report: TouchReport, unit: Unit) -> str:

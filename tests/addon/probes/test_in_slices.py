@@ -3,6 +3,7 @@
 """Work in slices between a window's events, without a window."""
 
 from time import perf_counter
+from types import SimpleNamespace
 
 import pytest
 
@@ -46,3 +47,18 @@ def test_the_button_of_the_panel_asks_the_latest_to_stop(extension, empty):
     in_slices._running.clear()
     assert (first._is_asked, latest._is_asked) == (False, True)
     assert empty.ops.tactile.stop() == {"FINISHED"}  # There is nothing to stop.
+
+
+def test_a_part_of_the_panel_shows_only_what_runs_for_it(extension):
+    in_slices, drawn = extension.tactile_addon.probes.in_slices, []
+    layout = SimpleNamespace(
+        progress=lambda **given: drawn.append(given["text"]), operator=lambda *_, **__: None
+    )
+    running = in_slices.InSlices()
+    running._done, running.section = lambda: ("Stability Map", None), "map"
+    in_slices._running[:] = [running]
+    for section, words in (("object", []), ("map", ["Stability Map"]), (None, ["Stability Map"])):
+        drawn.clear()
+        in_slices.draw_running(layout, section)
+        assert drawn == words
+    in_slices._running.clear()

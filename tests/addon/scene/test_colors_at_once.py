@@ -86,6 +86,14 @@ def test_a_touch_that_knows_nothing_does_not_set_the_range(empty, ball):
     assert 0.75 * limit <= both <= limit
 
 
+def test_curvatures_that_may_as_well_be_0_are_pale(empty, ball):
+    noisy = touch(empty, (0, 1, 0), extent=0.15, noise=0.02, seed=1)
+    found = noisy["tactile"]
+    assert max(abs(found[k]) - found[f"{k}_std"] for k in ("k1", "k2")) < 0.2 * found["k1_std"]
+    assert abs(found["mean_curvature"]) < found["color_limit"]
+    assert found["color_limit"] > max(found["k1_std"], found["k2_std"])
+
+
 def test_a_tiny_patch_does_not_set_the_range_of_the_others(empty, ball):
     wide, other = touch(empty, (0, 0, 1)), touch(empty, (0, 1, 0))
     own = wide["tactile"]["color_limit"]

@@ -59,7 +59,7 @@ def test_a_number_has_no_digit_beyond_the_first_one_of_its_deviation(extension):
     assert units.say(3.34e-7, -1, UNIT, 7e-4) == "0 ± 0.0007 1/mm"
     assert units.say(-0.002, -1, UNIT, 7e-4) == "-0.002 ± 0.0007 1/mm"
     flat = {"k1": 2e-40, "k2": -1e-7, "k1_std": 0.01, "k2_std": 0.01}
-    assert extension.tactile_addon.touch.wording.curvatures(flat, UNIT) == "0 1/mm and 0 1/mm"
+    assert extension.tactile_addon.touch.wording.curvatures(flat, UNIT) == "0 and 0 1/mm"
 
 
 def test_a_flat_patch_has_no_shape_index(said, empty):
@@ -319,7 +319,7 @@ def test_the_list_of_probes_leads_to_each(extension, empty):
     panel.draw_active(None, context, layout, empty.context.object)
     rows = [text.split("   ") for text, _ in layout.drawn if text.startswith("Cylinder")]
     assert [name for name, _ in rows] == ["Cylinder Probe", "Cylinder Probe.001"]
-    assert rows[0][1] == "0 1/m and 0 1/m"
+    assert rows[0][1] == "0 and 0 1/m"
     assert float(rows[1][1].split()[0]) == pytest.approx(-1.0, abs=0.05)
     assert empty.ops.tactile.activate(name="Cylinder Probe") == {"FINISHED"}
     assert empty.context.object.name == "Cylinder Probe"

@@ -30,6 +30,8 @@ DOMAINS = {
     "at an edge": closed_spline_domain(circle(SIXTH + 17, [1, 0.2, 0.1, 0.2, 1, 1]), 1.0),
     "notched": closed_spline_domain(circle(SIXTH, [1, 1, 0.1, 1, 0.9, 1]), 1.0),
     "narrow": closed_spline_domain(circle(SIXTH + 9) * [1.0, 0.35], 1.0),
+    "cut": closed_spline_domain(circle(SIXTH + 17, [1, 0.8, 0.85, 0.7, 1, 1]), 1.0, [0, 1, 1, 1, 0, 0]),
+    "cut once": closed_spline_domain(circle(SIXTH + 17, [1, 0.8, 1, 1, 1, 1]), 1.0, [0, 1, 0, 0, 0, 0]),
     "triangle": closed_spline_domain(circle([10, 130, 250]), 1.0),
 }
 QUARTIC = np.array([0.1, -0.2, 0.3, 0.1, 0.3, 0.0, -0.5, 0.1, 0.2])
@@ -116,10 +118,19 @@ def test_a_plane_has_few_triangles_and_a_tight_saddle_many():
     assert fine == pytest.approx(4.0 * counts["quartic"], rel=0.3)
 
 
+@pytest.mark.parametrize("name", ["cut", "cut once"])
+def test_a_plane_that_an_edge_cuts_has_few_vertices_and_its_corners_are_among_them(name):
+    points, _ = patch_mesh(PATCHES["plane"], DOMAINS[name], 1e-3)
+    assert len(points) < 300
+    gaps, _ = cKDTree(points[:, :2]).query(DOMAINS[name].corners)
+    assert len(gaps) in (3, 5) and gaps.max() == 0.0
+
+
 SYMMETRIC_DOMAINS = {
     "six": closed_spline_domain(circle(SIXTH), 1.0),
     "six turned": closed_spline_domain(circle(SIXTH + 30), 1.0),
     "four": closed_spline_domain(circle([0, 90, 180, 270]), 1.0),
+    "square": closed_spline_domain(circle([45, 135, 225, 315]), 1.0, [True] * 4),
     "flat": closed_spline_domain(circle(np.arange(0, 360, 45) + 22.5) * [1.0, 0.6], 1.0),
 }
 EVEN = np.array([0.0, 0.0, 0.0, 0.0, 0.3, 0.0, -0.5, 0.0, 0.2])
