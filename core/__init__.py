@@ -32,6 +32,7 @@ from .contours.finger import Surface
 from .contours.local_geometry import DegenerateCurvesError, Frame
 from .contours.tracking import track
 from .exploration.extent import Exploration
+from .exploration.facets import is_beside_bend, with_facets
 from .exploration.options import ExplorationOptions
 from .exploration.side_by_side import exploring_many
 from .exploration.taps import MeshError, doubts_by_mesh, mesh_error
@@ -48,11 +49,10 @@ from .reconstruction.result import Reconstruction
 from .reconstruction.serialization import from_dict, to_dict
 from .reconstruction.status import CONTRADICTING, DOUBTFUL_STD
 from .scan.face_orientation import DOUBLED, INWARD, open_edge_distance, orientation_fault
-from .scan.facets import is_beside_bend, with_facets
 from .scan.pose_search import Pose, register
 from .scan.sampling import scattered, spaced, spaced_count
 from .scan.verification import reachable, verify, verifying
-from .verdict import FINER, OK, SHORTER_EDGES, UNCERTAIN, Doubt, status_of
+from .verdict import FINER, OK, SHORTER_EDGES, SUBDIVIDE, UNCERTAIN, Doubt, status_of
 
 __version__ = "0.1.0"  # That of blender_manifest.toml; python -m tools.release compares them.
 __all__ = [
@@ -69,6 +69,7 @@ __all__ = [
     "OK",
     "SHORTER_EDGES",
     "SOLVERS",
+    "SUBDIVIDE",
     "UNCERTAIN",
     "UNEXPLAINED",
     "UNIT_METERS",

@@ -18,6 +18,7 @@ OK, UNCERTAIN, NOT_CONVERGED = "ok", "uncertain", "not_converged"  # Each status
 SHORTER, LONGER, PLANES = "use a shorter extent", "use a longer extent", "add sampling planes"
 FROM_EDGE = "move the point away from the edge"
 FINER_FACETS = "make the facets finer"
+SUBDIVIDE = "add a Subdivision modifier if the shape is smooth"
 FINER, COARSER = "use a smaller tolerance", "use a larger tolerance"
 SHORTER_EDGES, TOUCHES = "use a shorter edge length", "allow more touches"
 
@@ -39,7 +40,7 @@ REASONS = {
     "facets": Reason(
         "The facets here make ± {percent:.0f} % of the curvature, which is that of the facets, not of the "
         "shape",
-        ("add a Subdivision modifier if the shape is smooth",),
+        (SUBDIVIDE,),
     ),
     "taps": Reason(
         "Between the curves the surface is up to {percent:.2g} % of the radius off the patch, perhaps at an "
@@ -87,15 +88,15 @@ REASONS = {
     ),
     "heights": Reason(
         "Heights are accurate to {percent:.1f} % of the radius on average",
-        (SHORTER, PLANES),
+        (SUBDIVIDE, SHORTER, PLANES),
     ),
     "directions": Reason(
         "The principal directions may be {degrees:.0f} degrees off",
-        (SHORTER, LONGER, FROM_EDGE, PLANES),
+        (SUBDIVIDE, SHORTER, LONGER, FROM_EDGE, PLANES),
     ),
     "curvatures": Reason(
         "Curvatures are accurate to only {percent:.2g} % of 1 / radius in the least known direction",
-        (SHORTER, LONGER, FROM_EDGE, PLANES),
+        (SUBDIVIDE, SHORTER, LONGER, FROM_EDGE, PLANES),
     ),
     "curve": Reason(
         "A curve is {percent:.2g} % of the radius off what the others show, whose deviations explain "
@@ -105,7 +106,7 @@ REASONS = {
     "waves": Reason(
         "Waves of {percent:.1f} % of the radius run along the curves, which do not show where they go on "
         "between them",
-        (SHORTER, PLANES),
+        (SUBDIVIDE, SHORTER, PLANES),
     ),
     "flat_face": Reason(
         "The point is on a flat face, and the curvature is that of the bends next to it",

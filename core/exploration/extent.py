@@ -24,6 +24,7 @@ from ..reconstruction.explained import are_few, too_far
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import DOUBTFUL_STD
+from .facets import with_facets
 from .options import ExplorationOptions
 from .taps import tapped
 
@@ -106,7 +107,8 @@ class Touch:
         if extent is None:
             explored = yield from self._longest_sure()
             if method != "bayes":
-                explored = replace(explored, result=(yield from _fitted(explored.contours)))
+                r = yield from _fitted(explored.contours)
+                explored = replace(explored, result=self._with_facets(r))
         else:
             explored = yield from self._felt(extent / CONTACTS, CONTACTS)
         explored = self._with_taps(explored)
@@ -131,12 +133,21 @@ class Touch:
         return replace(explored, stds=tuple(stds))
 
     def _longest_sure(self) -> Steps:
-        """The touch of the longest half curves whose patch is sure, or else the most certain of all."""
+        """The touch of the longest half curves whose patch is sure, or else the most certain of all.
+
+        Half curves that end at the point, or are rough, hardly carry a sure fit: of these, one is fitted
+        where no other is sure, that whose curvature is the least rough.
+        """
         tried: list[Exploration] = []
+        rough: list[tuple[float, tuple[float, int]]] = []
         error = None
-        for step, count in self._in_order():
+        for rung in self._rungs():
+            roughness = self._roughness(rung)
+            if roughness > ROUGH:
+                rough.append((roughness / math.prod(rung), rung))
+                continue
             try:
-                explored = yield from self._felt(step, count)
+                explored = yield from self._felt(*rung)
             except DegenerateCurvesError as why:
                 error = error or why
                 continue
@@ -146,29 +157,36 @@ class Touch:
                     return explored
             tried.append(explored)
             r = explored.result
-            if r.mean_height_std > DOUBTFUL_STD * r.radius and not suffices(r):
-                break  # Noise leaves shorter half curves even less certain.
-        if error is not None and not tried:
-            raise error
-        return min(tried, key=lambda e: (e.result.status != "ok", e.result.mean_height_std / e.result.radius))
+            is_noisy = r.mean_height_std > DOUBTFUL_STD * r.radius and not suffices(r)
+            if is_noisy or [doubt.code for doubt in r.doubts] == ["facets"]:
+                break  # Noise leaves shorter half curves even less certain, and on these are fewer facets.
+        if rough or not tried:
+            longest = 0.0, (self.farthest / MOST_CONTACTS, MOST_CONTACTS)
+            _, rung = min(rough, key=lambda pair: pair[0], default=longest)
+            try:
+                tried.append((yield from self._felt(*rung)))
+            except DegenerateCurvesError as why:
+                if not tried:
+                    raise error or why from None
+        best = min(tried, key=self._uncertainty)
+        # Shorter half curves that lie in few facets give what curvatures the shape may have there.
+        shape = max((explored.result.shape_curvatures for explored in tried), key=len)
+        return replace(best, result=replace(best.result, shape_curvatures=shape))
 
-    def _in_order(self) -> Iterator[tuple[float, int]]:
-        """Steps and numbers of contacts of half curves to be fitted, from long to short.
+    def _uncertainty(self, found: Exploration) -> tuple[bool, float]:
+        """Whether a touch is in doubt, and the deviation of its curvatures, or what decides for an object."""
+        r = found.result
+        if self.options.largest_std is not None:
+            return r.status != "ok", r.mean_height_std / r.radius
+        return r.status != "ok", max(r.k1_std, r.k2_std)
 
-        Those that end at the point, or are rough, hardly carry a sure fit: the smoothest of them is the last.
-        """
-        explained = max(self.options.noise, self.options.largest_std or 0.0)
-        others: list[tuple[float, tuple[float, int]]] = []
-        longest = self.farthest / MOST_CONTACTS, MOST_CONTACTS
-        for rung in self._rungs():
-            contours, _ = next(self._denser(*rung))
-            points = np.vstack([contour.points for contour in contours])
-            rough = math.inf if stops_at(contours, self.point) else roughness(points - self.point, explained)
-            if rough <= ROUGH:
-                yield rung
-            else:
-                others.append((rough, rung))
-        yield min(others, key=lambda other: other[0], default=(0.0, longest))[1]
+    def _roughness(self, rung: tuple[float, int]) -> float:
+        """How rough contacts of this step and number are; infinite if a half curve ends at the point."""
+        contours, _ = next(self._denser(*rung))
+        if stops_at(contours, self.point):
+            return math.inf
+        points = np.vstack([contour.points for contour in contours])
+        return roughness(points - self.point, max(self.options.noise, self.options.largest_std or 0.0))
 
     def _rungs(self) -> Iterator[tuple[float, int]]:
         """Steps and numbers of contacts of half curves, from long to short.
@@ -192,7 +210,7 @@ class Touch:
                 break
         if isinstance(r, DegenerateCurvesError):
             raise r
-        return Exploration(contours, r, step * count, between, tuple(self.options.planes))
+        return Exploration(contours, self._with_facets(r), step * count, between, tuple(self.options.planes))
 
     def _denser(self, step: float, count: int) -> Iterator[tuple[list[Contour], float]]:
         """Contours with half curves of `count` contacts, then more often felt, and their steps.
@@ -216,6 +234,10 @@ class Touch:
         self.tapped.append(contacts)
         return replace(found, result=replace(r, taps=taps, known_height_std=r.mean_height_std))
 
+    def _with_facets(self, r: Reconstruction) -> Reconstruction:
+        """The reconstruction, as uncertain as facets leave it. To a whole object they are the shape."""
+        return r if self.options.largest_std is not None else with_facets(r, self.surface)
+
     def _followed(self, step: float, extent: float) -> list[Contour]:
         """The contours of the planes with contacts this step apart, at least to an extent."""
         if step not in self.followed:
@@ -238,7 +260,7 @@ class Touch:
         if found.extent < self.farthest:
             more = _shortened(more, self.point, len(more.points))
         contours = [*found.contours, more]
-        r = yield from _fitted(contours)
+        r = self._with_facets((yield from _fitted(contours)))
         return self._with_taps(replace(found, contours=contours, result=r, planes=(*found.planes, plane)))
 
 

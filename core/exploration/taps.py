@@ -101,7 +101,7 @@ def doubts_by_mesh(r: Reconstruction, error: MeshError) -> tuple[Doubt, ...]:
     mean, most = error.height or 0.0, CONTRADICTING * r.mean_height_std
     if r.status != OK:
         return r.doubts
-    tried = useless(r.method, r.contours)
+    tried = useless(r.method, r.contours, r.shape_curvatures)
     return (
         *beyond("gap", error.missing, DOUBTFUL_GAP, tried),
         *beyond("mesh", mean / r.radius, most / r.radius, tried),

@@ -11,7 +11,7 @@ import numpy as np
 from ..arguments import Array
 from ..bayes.posterior import CONFIDENCE, SurfacePosterior
 from ..contours.contour import SURFACE_ENDS, UNEXPLAINED, Contour, unit_normals
-from ..verdict import FROM_EDGE, LONGER, SHORTER, Doubt, beyond
+from ..verdict import FROM_EDGE, LONGER, SHORTER, SUBDIVIDE, Doubt, beyond
 
 # benchmarks.stability chose these, and benchmarks.real LIKELY and those of taps. A fit is in doubt beyond
 # them.
@@ -62,10 +62,13 @@ class Taps(NamedTuple):
     height: float | None = None
 
 
-def useless(method: str, contours: Sequence[Contour]) -> tuple[str, ...]:
-    """Advice on extents that does not apply: a touch that chose its own has tried shorter ones."""
+def useless(method: str, contours: Sequence[Contour], shape: Array) -> tuple[str, ...]:
+    """Advice that does not apply: a touch that chose its extent has tried shorter ones, a fine mesh is fine.
+
+    shape : (n, 2), curvatures of the shape that few facets stand for; none on a fine mesh
+    """
     has_tried = method == "bayes" and UNEXPLAINED in stops_of(contours)
-    return (SHORTER,) if has_tried else ()
+    return (*([SHORTER] if has_tried else []), *([] if len(shape) else [SUBDIVIDE]))
 
 
 def stops_of(contours: Sequence[Contour]) -> set[str]:
@@ -138,7 +141,7 @@ def about_frame(
     if stops.intersection(SURFACE_ENDS):
         useless = (*useless, LONGER)
     else:
-        useless = (SHORTER, FROM_EDGE, LONGER) if UNEXPLAINED in stops else (SHORTER, FROM_EDGE)
+        useless = (*useless, SHORTER, FROM_EDGE, *([LONGER] if UNEXPLAINED in stops else []))
     turn = posterior.turn(LIKELY if posterior.amplitude else CONFIDENCE)
     if turn > DOUBTFUL_TURN and not posterior.is_round:
         yield Doubt("directions", turn, DOUBTFUL_TURN, useless=useless)

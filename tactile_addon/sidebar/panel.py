@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 from bpy.app.translations import pgettext_iface as iface
 
+from ... import core
 from ..comparison.verify_operator import verification_rows, verification_table
 from ..probes import probe
 from ..probes.in_slices import draw_running
@@ -29,7 +30,6 @@ from .patch_rows import found_values, main_rows, other_rows, plane_rows
 from .rows import draw_rows, draw_sentence
 
 TAB = "Tactile"
-FACETED = {"facets", "folds"}  # A Subdivision modifier may take these doubts away.
 HELP = "Click on a mesh: a probe feels its surface there and keeps a patch of it with its curvatures"
 OTHER_MODE = "Objects are touched in Object Mode, so the buttons are gray"
 NARROW = 200  # A sidebar of fewer pixels at scale 1 is narrow.
@@ -156,7 +156,7 @@ def _draw_remedy(layout: bpy.types.UILayout, record: Mapping[str, Any]) -> None:
     """Draws the button that helps a probe's patch which is outdated, or felt few facets."""
     if record["status"] == "outdated":
         layout.operator("tactile.update", icon="FILE_REFRESH")
-    elif FACETED.intersection(doubt["code"] for doubt in record["doubts"]):
+    elif any(doubt["code"] == "folds" or core.SUBDIVIDE in doubt["advice"] for doubt in record["doubts"]):
         layout.operator("tactile.add_subdivision", icon="MOD_SUBSURF")
 
 

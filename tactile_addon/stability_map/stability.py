@@ -201,9 +201,9 @@ class StabilityMap:
         return _reason_of(core.stops_at(contours, point) or shortest.stops)
 
     def _note(self, number: int, touch: core.Exploration) -> None:
-        result = core.with_facets(touch.result, self.surface.face_near, self.surface.corners_of)
-        self.few_facets += result.gravest is not None and result.gravest.code == "facets"
+        result = touch.result
         is_sure = result.gravest is None
+        self.few_facets += not is_sure and len(result.shape_curvatures) > 0
         self.reason[number] = REASON_KEYS.index("patch" if is_sure else "doubt")
         self.measures[number] = (
             NOTHING if result.taps.height is None else result.taps.height,

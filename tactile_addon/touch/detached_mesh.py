@@ -132,7 +132,7 @@ class DetachedMesh(PlacedMesh):
 
     def is_of_facets(self, r: core.Reconstruction) -> bool:
         """Whether the curvature of a touch is that of facets, before anything else that is in doubt."""
-        gravest = core.with_facets(r, self.face_near, self.corners_of).gravest
+        gravest = core.with_facets(r, self).gravest
         return gravest is not None and gravest.code == "facets"
 
 

@@ -87,7 +87,6 @@ def touch(
     more = {"rng": seed, "tangent": axes[:, 0], "tolerance": tolerance, "noise": noise, **fit}
     found = _explored(surface, point, outward, planes, extent, step, **more)
     clock.append(perf_counter())
-    found = replace(found, result=core.with_facets(found.result, surface.face_near, surface.corners_of))
     require_single("patch", found.result.radius, found.result.frame.origin)
     report: TouchReport = {
         "source": obj.name,
@@ -131,9 +130,7 @@ def _explored(
     except core.DegenerateCurvesError as error:
         facet = surface.facet(point)
         is_large = facet >= LARGE_FACET * (step or FINEST_STEP * surface.size)
-        if more["noise"] or not (
-            is_large and core.is_beside_bend(point, surface.face_near, surface.corners_of)
-        ):
+        if more["noise"] or not (is_large and core.is_beside_bend(point, surface)):
             raise
         raise ValueError(
             f"{error}. The facets there are {length(facet)} long: add a Subdivision modifier if the "

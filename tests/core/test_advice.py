@@ -20,9 +20,9 @@ from tests.core.atlas.test_orientation import sphere
 from tests.core.bayes.test_bends import fold
 from tests.core.bayes.test_measured_normals import measured, tilted, touched
 from tests.core.bayes.test_near_point import cone
+from tests.core.exploration.test_facets import arc, judged, rounded
 from tests.core.exploration.test_taps import FARTHEST, UP, Holes, Sector, explore
 from tests.core.reconstruction.test_status import contours_of, cut_short, moved, waves
-from tests.core.scan.test_facets import arc, judged, rounded
 
 
 def facets():

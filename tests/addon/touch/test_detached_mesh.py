@@ -100,7 +100,7 @@ def test_a_touch_within_one_bent_facet_is_in_doubt_on_a_map_too(empty, extension
     assert patch["tactile"]["k1_std"] > max(abs(patch["tactile"]["k1"]), abs(patch["tactile"]["k2"])) > 0.5
     mesh = extension.tactile_addon.touch.detached_mesh.DetachedMesh(obj, depsgraph)
     found = extension.tactile_addon.scene.patch_record.reconstruction_of(patch)
-    on_mesh = extension.core.with_facets(found, mesh.face_near, mesh.corners_of)
+    on_mesh = extension.core.with_facets(found, mesh)
     assert on_mesh.status == "uncertain"
     assert on_mesh.k1_std > max(abs(found.k1), abs(found.k2))
 

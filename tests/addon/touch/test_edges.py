@@ -142,7 +142,7 @@ def test_a_patch_on_facets_names_them_and_the_modifier(empty, monkey):
 
 def test_a_touch_that_fails_on_facets_names_them_and_the_modifier(empty, monkey):
     corner = monkey.data.vertices[0].co
-    words = r"The facets there are [\d.]+ \w*m long: add a Subdivision modifier if the mesh stands"
+    words = r"The facets there are [\d.]+ \w*m long: add a Subdivision modifier if the shape is smooth"
     with pytest.raises(RuntimeError, match=words):
         empty.ops.tactile.reconstruct(target="Suzanne", location=corner)
 
@@ -223,7 +223,7 @@ def test_the_verdict_on_few_facets_is_about_them_until_the_torus_is_subdivided(e
         assert empty.ops.tactile.pick(target=torus.name, location=place, new=True) == {"FINISHED"}
         record = empty.context.object.children[0]["tactile"].to_dict()
         said = wording.verdict(record, units.unit_of(empty.context.scene, record["radius"]))
-        assert "make the facets finer" in said or "add a Subdivision modifier if the mesh" in said
+        assert "make the facets finer" in said or "add a Subdivision modifier if the shape" in said
     empty.ops.ed.undo_push(message="Picked")
     by_hand(empty, empty.ops.tactile.add_subdivision)
     assert [modifier.levels for modifier in torus.modifiers] == [3]

@@ -55,7 +55,7 @@ def arc(facets, bend=60.0):
 
 def judged(r, mesh):
     """The reconstruction with what facets add to its deviations, and whether they are a doubt."""
-    found = core.with_facets(r, mesh.face_near, mesh.corners_of)
+    found = core.with_facets(r, mesh)
     return found, any(doubt.code == "facets" for doubt in found.doubts)
 
 
@@ -256,9 +256,9 @@ def outward(triangles):
     ids=["16 x 64", "64 x 12", "12 x 64 in triangles", "64 x 12 in triangles", "hull"],
 )
 def test_facets_that_are_long_across_a_smooth_bend_are_felt(ball):
-    """They are narrow in the other direction, in which a touch feels many of them."""
+    """Within one the curvature would be off by 1. A touch goes over several, though it is in doubt then."""
     rng = np.random.default_rng(1)
-    wrong = called = 0
+    wrong, errors = 0, []
     for up in rng.normal(size=(8, 3)):
         up /= np.linalg.norm(up)
         point, normal = ball.ray_cast(tuple(2.0 * up), tuple(-up), 2.0)
@@ -266,10 +266,10 @@ def test_facets_that_are_long_across_a_smooth_bend_are_felt(ball):
         r, few = judged(r, ball)
         off = max(abs(r.k1 + 1.0), abs(r.k2 + 1.0))
         assert off > 0.15 or not few
-        called += few
+        errors.append(off)
         wrong += r.status == "ok" and off > 0.25 and is_beyond(off, r)
         assert few or off < 3.5 * max(r.k1_std, r.k2_std)
-    assert called
+    assert np.median(errors) < 0.35
     assert wrong <= 1
 
 
@@ -312,7 +312,7 @@ def test_the_deviation_has_how_far_estimates_of_the_shape_are_off(radius, std):
 
 def test_curvatures_of_flattened_balls_are_seldom_wrongly_said_to_be_those_of_facets():
     """They change within a facet or two, which corners of facets show and their normals do not."""
-    rng, called, wrongly, wrong = np.random.default_rng(0), 0, 0, 0
+    rng, errors, wrongly, wrong = np.random.default_rng(0), [], 0, 0
     for height in (0.2, 0.3):
         ball = Mesh(uv_ball(32, 16).corners * (1.0, 1.0, height))
         for share, turn in rng.random((40, 2)):
@@ -326,11 +326,11 @@ def test_curvatures_of_flattened_balls_are_seldom_wrongly_said_to_be_those_of_fa
             apart = np.abs(np.sort([r.k1, r.k2]) - exact)
             off = apart.max() / -exact[0]
             r, few = judged(r, ball)
-            called += few
+            errors.append(off)
             wrongly += few and off < 0.15
             wrong += r.status == "ok" and off > 0.25 and is_beyond(off, r)
             assert r.status != "ok" or few or (apart < 3.0 * np.array([r.k1_std, r.k2_std])).all()
-    assert called > 8
+    assert np.median(errors) < 0.155
     assert wrongly <= 2
     assert wrong <= 12  # Patches reach over the rim, where their deviation is as large.
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,6 +31,17 @@ MIN_WIDTH_RATIO = 0.25
 NEIGHBOR_STEP = 0.05  # The facet behind an edge is looked for this share of the width beyond it.
 
 
+@runtime_checkable
+class Mesh(Protocol):
+    """A surface whose faces can be looked at."""
+
+    def face_near(self, point: Array) -> int:
+        """The number of the face nearest to a point (3,) of the world."""
+
+    def corners_of(self, number: int) -> ArrayLike:
+        """The corners (k, 3) of a face in the world, in order."""
+
+
 class Facet(NamedTuple):
     """A face: its corners (k, 3), and its unit normal."""
 
@@ -43,53 +54,41 @@ class Facet(NamedTuple):
         return float(np.ptp(self.corners @ across)) / length if length else 0.0
 
 
-def with_facets(
-    r: Reconstruction, face_near: Callable[[Array], int], corners_of: Callable[[int], ArrayLike]
-) -> Reconstruction:
+def with_facets(r: Reconstruction, surface: Any) -> Reconstruction:
     """The reconstruction, with curvatures as uncertain as facets leave those of the shape they stand for.
 
-    It is the same on a fine mesh, whose facets are narrow compared with the radius. A facet whose edges are
-    all sharp or those of fillets, as that of a cube, is the shape itself.
-
-    face_near : the number of the face nearest to a point (3,) of the world
-    corners_of : the corners (k, 3) of a face in the world, in order
+    It is the same on a surface that is no Mesh, and on a fine one, whose facets are narrow compared with the
+    radius. A facet whose edges are all sharp or those of fillets, as that of a cube, is the shape itself.
     """
-    shape = _shape_curvatures(r, face_near, corners_of)
+    shape = _shape_curvatures(r, surface) if isinstance(surface, Mesh) else None
     return replace(r, shape_curvatures=np.array(shape)) if shape else r
 
 
-def _shape_curvatures(
-    r: Reconstruction, face_near: Callable[[Array], int], corners_of: Callable[[int], ArrayLike]
-) -> list[Array]:
+def _shape_curvatures(r: Reconstruction, mesh: Mesh) -> list[Array]:
     """The principal curvatures (2,) of the shape, in order, by how facets turn and by their corners."""
-    shape = cache(lambda face: _facet(corners_of(face)))
+    shape = cache(lambda face: _facet(mesh.corners_of(face)))
 
     def facet_near(at: Array) -> Facet:
         """The face nearest to a point (3,)."""
-        return shape(face_near(at))
+        return shape(mesh.face_near(at))
 
     width = _smooth_width(facet_near(r.frame.origin), facet_near)
     if width < max(MIN_WIDTH_RATIO * r.radius, SMALLEST):
         return []
     points = _around(r, TURNING * width)
-    faces = [face_near(point) for point in points]
-    within = [set(map(face_near, _around(r, share * width))) for share in CORNERS]
+    faces = [mesh.face_near(point) for point in points]
+    within = [set(map(mesh.face_near, _around(r, share * width))) for share in CORNERS]
     by_corners = [_of_corners(r, map(shape, some)) for some in within]
     turning = _turning(r, points, [shape(face) for face in faces])
     return [turning, *(found for found in by_corners if found is not None)]
 
 
-def is_beside_bend(
-    point: Array, face_near: Callable[[Array], int], corners_of: Callable[[int], ArrayLike]
-) -> bool:
-    """Whether the facet nearest to a point (3,) has an edge that stands for a smooth bend, as on a ball.
-
-    The arguments are those of `with_facets`.
-    """
+def is_beside_bend(point: Array, mesh: Mesh) -> bool:
+    """Whether the facet nearest to a point (3,) has an edge that stands for a smooth bend, as on a ball."""
 
     def facet_near(at: Array) -> Facet:
         """The face nearest to a point (3,)."""
-        return _facet(corners_of(face_near(at)))
+        return _facet(mesh.corners_of(mesh.face_near(at)))
 
     return _smooth_width(facet_near(point), facet_near) > 0.0
 
