@@ -67,7 +67,8 @@ def facets():
     yield from pick(torus, (0.9, -0.86, 0.05))
     look(probe().matrix_world.translation, (1, -1, 0.6), 1.5)
     yield 1
-    check("a touch of facets is about them", patch()["tactile"]["doubts"][0]["code"] == "facets", "")
+    check("a touch of facets is about them", "Subdivision" in patch()["tactile"]["doubts"][0]["advice"], "")
+    check("... and goes over several of them", patch()["tactile"]["radius"] > 0.3, "")
     picture("facets")
     bpy.ops.ed.undo_push(message="Picked")
     gui.click(*SUBDIVIDE_BUTTON)
@@ -85,7 +86,7 @@ def facets():
     yield from until(lambda: not bpy.data.objects["Torus"].modifiers)
     yield from until(is_complete)
     check("one Ctrl Z takes it back", not bpy.data.objects["Torus"].modifiers, "")
-    check("... and the verdict with it", patch()["tactile"]["doubts"][0]["code"] == "facets", "")
+    check("... and the verdict with it", "Subdivision" in patch()["tactile"]["doubts"][0]["advice"], "")
 
 
 def forehead():
