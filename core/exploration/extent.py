@@ -24,6 +24,7 @@ from ..reconstruction.explained import are_few, too_far
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import DOUBTFUL_STD
+from ..verdict import OK
 from .facets import with_facets
 from .options import ExplorationOptions
 from .taps import tapped
@@ -108,7 +109,8 @@ class Touch:
             explored = yield from self._longest_sure()
             if method != "bayes":
                 r = yield from _fitted(explored.contours)
-                explored = replace(explored, result=self._with_facets(r))
+                shape = explored.result.shape_curvatures
+                explored = replace(explored, result=replace(r, shape_curvatures=shape))
         else:
             explored = yield from self._felt(extent / CONTACTS, CONTACTS)
         explored = self._with_taps(explored)
@@ -123,10 +125,7 @@ class Touch:
                 more = yield from self._with_plane(explored, plane)
             except ValueError:  # Nothing can be felt along that plane. What was felt so far stays.
                 break
-            if (
-                explored.result.status == "ok" != more.result.status
-                or more.result.mean_height_std >= stds[-1]
-            ):
+            if explored.result.status == OK != more.result.status or more.result.mean_height_std >= stds[-1]:
                 break
             explored = more
             stds.append(explored.result.mean_height_std)
@@ -168,17 +167,19 @@ class Touch:
             except DegenerateCurvesError as why:
                 if not tried:
                     raise error or why from None
-        best = min(tried, key=self._uncertainty)
-        # Shorter half curves that lie in few facets give what curvatures the shape may have there.
-        shape = max((explored.result.shape_curvatures for explored in tried), key=len)
-        return replace(best, result=replace(best.result, shape_curvatures=shape))
+        return self._most_certain(tried)
 
-    def _uncertainty(self, found: Exploration) -> tuple[bool, float]:
-        """Whether a touch is in doubt, and the deviation of its curvatures, or what decides for an object."""
-        r = found.result
+    def _most_certain(self, tried: list[Exploration]) -> Exploration:
+        """The touch whose curvatures are the most certain or, for a whole object, whose height is."""
         if self.options.largest_std is not None:
-            return r.status != "ok", r.mean_height_std / r.radius
-        return r.status != "ok", max(r.k1_std, r.k2_std)
+            return min(
+                tried, key=lambda e: (e.result.status != OK, e.result.mean_height_std / e.result.radius)
+            )
+        # The shortest half curves lie in the fewest facets, which give curvatures that the shape may have.
+        shortest = min(tried, key=lambda e: e.extent).result
+        shape = with_facets(shortest, self.surface).shape_curvatures
+        judged = [replace(e, result=replace(e.result, shape_curvatures=shape)) for e in tried]
+        return min(judged, key=lambda e: (e.result.status != OK, max(e.result.k1_std, e.result.k2_std)))
 
     def _roughness(self, rung: tuple[float, int]) -> float:
         """How rough contacts of this step and number are; infinite if a half curve ends at the point."""
@@ -210,7 +211,7 @@ class Touch:
                 break
         if isinstance(r, DegenerateCurvesError):
             raise r
-        return Exploration(contours, self._with_facets(r), step * count, between, tuple(self.options.planes))
+        return Exploration(contours, r, step * count, between, tuple(self.options.planes))
 
     def _denser(self, step: float, count: int) -> Iterator[tuple[list[Contour], float]]:
         """Contours with half curves of `count` contacts, then more often felt, and their steps.
@@ -225,18 +226,15 @@ class Touch:
                 yield contours, between
 
     def _with_taps(self, found: Exploration) -> Exploration:
-        """The touch together with its taps."""
+        """The touch together with its taps, and as uncertain as facets leave it."""
         r = found.result
         # A largest deviation judges the fit in place of shares of the radius.
         if r.taps is not None or self.options.largest_std is not None:
             return found
         taps, contacts = tapped(self.surface, r, np.concatenate(self.tapped))
         self.tapped.append(contacts)
-        return replace(found, result=replace(r, taps=taps, known_height_std=r.mean_height_std))
-
-    def _with_facets(self, r: Reconstruction) -> Reconstruction:
-        """The reconstruction, as uncertain as facets leave it. To a whole object they are the shape."""
-        return r if self.options.largest_std is not None else with_facets(r, self.surface)
+        r = replace(r, taps=taps, known_height_std=r.mean_height_std)
+        return replace(found, result=with_facets(r, self.surface))
 
     def _followed(self, step: float, extent: float) -> list[Contour]:
         """The contours of the planes with contacts this step apart, at least to an extent."""
@@ -260,7 +258,7 @@ class Touch:
         if found.extent < self.farthest:
             more = _shortened(more, self.point, len(more.points))
         contours = [*found.contours, more]
-        r = self._with_facets((yield from _fitted(contours)))
+        r = yield from _fitted(contours)
         return self._with_taps(replace(found, contours=contours, result=r, planes=(*found.planes, plane)))
 
 
@@ -286,7 +284,7 @@ def _is_sure(found: Exploration, options: ExplorationOptions) -> bool:
     """Whether a touch is as certain as the options ask, and its patch explains contacts and taps."""
     r = found.result
     off = 0.0 if r.taps is None else (r.taps.height or 0.0) / r.radius + r.taps.missing
-    is_ok = r.status == "ok" and off <= TAPS_OFF
+    is_ok = r.status == OK and off <= TAPS_OFF
     is_certain = r.mean_height_std <= options.largest_std if options.largest_std else is_ok
     return is_certain and _explains(found, options)
 
