@@ -32,7 +32,7 @@ NEIGHBOR_STEP = 0.05  # The facet behind an edge is looked for this share of the
 
 
 @runtime_checkable
-class Mesh(Protocol):
+class FacetedSurface(Protocol):
     """A surface whose faces can be looked at."""
 
     def face_near(self, point: Array) -> int:
@@ -57,14 +57,14 @@ class Facet(NamedTuple):
 def with_facets(r: Reconstruction, surface: Any) -> Reconstruction:
     """The reconstruction, with curvatures as uncertain as facets leave those of the shape they stand for.
 
-    It is the same on a surface that is no Mesh, and on a fine one, whose facets are narrow compared with the
+    It is the same on a surface that is no FacetedSurface, and on a fine one, whose facets are narrow compared with the
     radius. A facet whose edges are all sharp or those of fillets, as that of a cube, is the shape itself.
     """
-    shape = _shape_curvatures(r, surface) if isinstance(surface, Mesh) else None
+    shape = _shape_curvatures(r, surface) if isinstance(surface, FacetedSurface) else None
     return replace(r, shape_curvatures=np.array(shape)) if shape else r
 
 
-def _shape_curvatures(r: Reconstruction, mesh: Mesh) -> list[Array]:
+def _shape_curvatures(r: Reconstruction, mesh: FacetedSurface) -> list[Array]:
     """The principal curvatures (2,) of the shape, in order, by how facets turn and by their corners."""
     shape = cache(lambda face: _facet(mesh.corners_of(face)))
 
@@ -83,7 +83,7 @@ def _shape_curvatures(r: Reconstruction, mesh: Mesh) -> list[Array]:
     return [turning, *(found for found in by_corners if found is not None)]
 
 
-def is_beside_bend(point: Array, mesh: Mesh) -> bool:
+def is_beside_bend(point: Array, mesh: FacetedSurface) -> bool:
     """Whether the facet nearest to a point (3,) has an edge that stands for a smooth bend, as on a ball."""
 
     def facet_near(at: Array) -> Facet:
