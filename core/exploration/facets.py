@@ -57,7 +57,7 @@ class Facet(NamedTuple):
 def with_facets(r: Reconstruction, surface: Any) -> Reconstruction:
     """The reconstruction, with curvatures as uncertain as facets leave those of the shape they stand for.
 
-    It is the same on a surface that is no FacetedSurface, and on a fine one, whose facets are narrow compared with the
+    It is the same on a surface without faces, and on a fine one, whose facets are narrow compared with the
     radius. A facet whose edges are all sharp or those of fillets, as that of a cube, is the shape itself.
     """
     shape = _shape_curvatures(r, surface) if isinstance(surface, FacetedSurface) else None
