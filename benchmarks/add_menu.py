@@ -185,8 +185,11 @@ def draw(pairs, name):
 
 def print_touched(adds, picture):
     """Prints and draws the objects that functions add, by name, with reports that are not ok and refusals."""
+    import bpy
+
     rows, pairs, messages = [], [], []
     with blender.quiet():
+        bpy.ops.wm.read_homefile(use_empty=True)
         for name, add in adds.items():
             try:
                 source, made, seconds = touched(add)
@@ -209,16 +212,12 @@ def main():
     parser.add_argument("--scans", action="store_true", help="a cube, a bottle and a pear instead")
     parser.add_argument("--expected", action="store_true", help="print only what the dialog expects")
     options = parser.parse_args()
-    with blender.quiet():
-        addon = blender.start(options.zip).tactile_addon
-        import bpy
-
-        bpy.ops.wm.read_homefile(use_empty=True)
-        adds = scans() if options.scans else shapes()
-        if options.expected:
-            found = ((name, *expected(addon, add)) for name, add in adds.items())
-            rows = [[name, f"{touches}", f"{seconds:.0f}"] for name, touches, seconds, *_ in found]
+    addon = blender.start(options.zip).tactile_addon
+    adds = scans() if options.scans else shapes()
     if options.expected:
+        with blender.quiet():
+            found = [(name, *expected(addon, add)) for name, add in adds.items()]
+        rows = [[name, f"{touches}", f"{seconds:.0f}"] for name, touches, seconds, *_ in found]
         table(["object", "touches expected", "seconds expected"], rows)
         return
     some = {name: add for name, add in adds.items() if options.only in name}

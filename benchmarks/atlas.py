@@ -20,7 +20,6 @@ thin walls and several pieces, each from several starts (benchmarks.atlas_shapes
 import numpy as np
 
 from tests import solids
-from tools import blender
 
 from . import machine, parser_of, scan_files, table, timed
 from .atlas_shapes import print_shapes
@@ -137,8 +136,7 @@ def main():
     names = [name for name in (*SCANS, "ring", "egg") if options.only in name]
     rows, bends = [], []
     for name in names:
-        with blender.quiet():
-            thing = Scanned(name) if name in SCANS else Exact(name)
+        thing = Scanned(name) if name in SCANS else Exact(name)
         for tolerance in (t for t in TOLERANCES if options.finest <= t <= options.coarsest):
             cells, curvatures = row(thing, tolerance)
             rows.append(cells)

@@ -24,7 +24,6 @@ import numpy as np
 import core
 from core.triangles import triangle_cross
 from tests import solids
-from tools import blender
 
 from . import machine, scan_files, table, timed
 from .real import Scan
@@ -97,10 +96,7 @@ class Made(Rays):
 
 def things(makers, only):
     """Yields the objects of functions by name, those with `only` in their names."""
-    for name in (name for name in makers if only in name):
-        with blender.quiet():
-            thing = Made(name, *makers[name]())
-        yield thing
+    yield from (Made(name, *make()) for name, make in makers.items() if only in name)
 
 
 # Objects ---------------------------------------------------------------------------------------------
@@ -169,13 +165,8 @@ def revolved(profile, is_ring=False, sections=SECTIONS):
     profile = np.array(profile, dtype=float)
     turns = 2.0 * np.pi * np.arange(sections) / sections
     radius, height = profile.T
-    vertices = np.column_stack(
-        [
-            np.outer(radius, np.cos(turns)).ravel(),
-            np.outer(radius, np.sin(turns)).ravel(),
-            np.repeat(height, sections),
-        ]
-    )
+    x, y = (np.outer(radius, function(turns)).ravel() for function in (np.cos, np.sin))
+    vertices = np.column_stack([x, y, np.repeat(height, sections)])
     index = np.arange(len(vertices)).reshape(-1, sections)
     index[radius == 0.0] = index[radius == 0.0, :1]  # On the axis there is one vertex only.
     index = np.vstack([index, index[:1]]) if is_ring else index
@@ -420,7 +411,5 @@ def print_shapes(only, tolerances, starts, places):
                 print(line(runs[-1]), file=sys.stderr, flush=True)
             rows.append(row(thing, tolerance, runs, len(starts) - len(runs)))
     table(HEAD, rows, left=2)
-    print(
-        "Distances are in tolerances, times in CPU seconds; of several runs there is the worst, or the range."
-    )
+    print("Distances are in tolerances, times in CPU seconds; of several runs it has the worst or the range.")
     print(f"{machine('bpy', 'numpy', 'scipy')}.")

@@ -233,12 +233,11 @@ def scan_touches(scan, count):
 
 def scan_rows(count):
     """{name: touches} of all scans, about `count` for each number of planes."""
-    from .real import Scan, blender
+    from .real import Scan
 
     rows, paths = defaultdict(list), sorted(SCANS_FOLDER.glob("*.*"))
     for path in paths:
-        with blender.quiet():
-            scan = Scan(path)
+        scan = Scan(path)
         for name, r in scan_touches(scan, max(1, round(count / len(paths) / len(EXTENTS)))):
             for kind, of in by_truth(scan, r):
                 rows[f"{name}, {kind}"].append(of)

@@ -149,8 +149,7 @@ def main():
     parser = parser_of(__doc__, takes_zip=True)
     parser.add_argument("--models", type=Path, metavar="FOLDER")
     arguments = parser.parse_args()
-    with blender.quiet():
-        extension = blender.start(arguments.zip)
+    extension = blender.start(arguments.zip)
     import bpy
 
     planes = [extension.core.SamplingPlane(math.radians(azimuth)) for azimuth in AZIMUTHS]

@@ -24,7 +24,6 @@ from scipy.spatial.distance import cdist
 
 import core
 from tests import solids
-from tools import blender
 
 from . import machine, parser_of, table, timed
 from .atlas_shapes import Made
@@ -97,8 +96,7 @@ def length_of(found):
 
 def row(path, tolerance):
     """The cells of an object."""
-    with blender.quiet():
-        scan = Scan(path)
+    scan = Scan(path)
     thing = Made(path.stem, scan.points, scan.faces)
     low, high = thing.vertices.min(axis=0) - MARGIN, thing.vertices.max(axis=0) + MARGIN
     places = np.random.default_rng(0).uniform(low, high, (PLACES, 3))

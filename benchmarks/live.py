@@ -99,8 +99,7 @@ def updates(probe, clock):
 def main():
     parser = parser_of(__doc__, takes_zip=True)
     options = parser.parse_args()
-    with blender.quiet():
-        extension = blender.start(options.zip)
+    extension = blender.start(options.zip)
     import bpy
 
     addon, core, clock = extension.tactile_addon, extension.core, Clock()

@@ -241,21 +241,16 @@ def print_scans(only, seeds, is_full):
         if not found:
             continue
         finite, even = (sum(one[key] for one in found) for key in ("finite", "even"))
-        rows.append(
-            [
-                name,
-                str(len(found)),
-                str(sum(one["ok"] for one in found)),
-                str(sum(one["closed"] for one in found)),
-                f"{finite / len(found):.0f}",
-                f"{1e3 * sum(one['wrong'] for one in found) / max(even, 1):.2f}",
-                f"{1e3 * sum(one['near wrong'] for one in found) / max(finite - even, 1):.2f}",
-                f"{1e3 * sum(one['sure wrong'] for one in found) / max(finite, 1):.2f}",
-                f"{100 * np.mean([one['felt above'] for one in found]):.1f}",
-                f"{np.mean([one['within'] for one in found]):.3f}",
-                f"{np.mean([one['seconds'] for one in found]):.1f}",
-            ]
+        counts = {"wrong": even, "near wrong": finite - even, "sure wrong": finite}
+        above, within, seconds = (
+            np.mean([one[key] for one in found]) for key in ("felt above", "within", "seconds")
         )
+        rows.append([
+            *(name, str(len(found)), *(str(sum(one[key] for one in found)) for key in ("ok", "closed"))),
+            f"{finite / len(found):.0f}",
+            *(f"{1e3 * sum(one[key] for one in found) / max(of, 1):.2f}" for key, of in counts.items()),
+            *(f"{100 * above:.1f}", f"{within:.3f}", f"{seconds:.1f}"),
+        ])  # fmt: skip
     head = [
         *("full scans of" if is_full else "partial scans of", "scans", "ok", "closed", "finite places"),
         *("wrong signs, permille", "near contacts", "sure ones", "% finite above", "within 90 %", "s"),

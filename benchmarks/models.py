@@ -33,11 +33,7 @@ def main():
     parser.add_argument("folder", type=Path, help="the folder of models")
     parser.add_argument("--only", default="", help="only models with this in their names")
     options = parser.parse_args()
-    with blender.quiet():
-        blender.start(options.zip)
-        import bpy
-
-        bpy.ops.wm.read_homefile(use_empty=True)
+    blender.start(options.zip)
     paths = [p for p in sorted(options.folder.iterdir()) if p.suffix in (".obj", ".ply", ".stl")]
     adds = {path.stem: partial(imported, path) for path in paths if options.only in path.name}
     print_touched(adds, "models")

@@ -49,6 +49,7 @@ DENSE = 150  # The number of points of the mesh to which the true frame is fitte
 class Scan(Rays):
     """A scan, centered and scaled to size 1, that casts rays by Blender's tree of its faces."""
 
+    @blender.quiet()
     def __init__(self, path):
         import bpy
 
@@ -291,13 +292,9 @@ def _turned(scan, r):
 
 
 def automatic_table(rows):
-    print(
-        "(c) Automatic touches. A doubt is right where the heights are off by over 2 % of the radius or three"
-    )
-    print(
-        "deviations, or the frame by 10 degrees where curvatures differ. Areas are in ‰ of the size "
-        "squared, the radius in ‰ of the size, times in ms of the processor.\n"
-    )
+    print("(c) Automatic touches. A doubt is right where the heights are off by over 2 % of the radius or")
+    print("three deviations, or the frame by 10 degrees where curvatures differ. Areas are in ‰ of the size")
+    print("squared, the radius in ‰ of the size, times in ms of the processor.\n")
     head = "scan|sure|in doubt|refused|justified warnings|sure, off > 2 %|> 5 deviations|turned"
     head += "|all areas|radius|ms"
     total = [sum(row[i] for row in rows.values()) for i in range(8)]
@@ -311,9 +308,7 @@ def main():
     parser.add_argument("--only", choices=("fixed", "automatic"), help="only this part")
     parser.add_argument("--scan", default="", help="only scans with this in their names")
     options = parser.parse_args()
-    paths = scan_files(options.scan)
-    with blender.quiet():
-        scans = [Scan(path) for path in paths]
+    scans = [Scan(path) for path in scan_files(options.scan)]
     if options.only != "automatic":
         scores, seconds = {}, defaultdict(list)
         for scan in scans:

@@ -390,13 +390,9 @@ def _harmless(of):
 
 
 def rule_table(results):
-    print(
-        "For each method the cases where a warning or a refusal is due (all refusals count) and those where"
-    )
-    print(
-        "it was not given; the harmless cases, and the share of them that were warned of; and the median of"
-    )
-    print("mean height_std over mean |dz|.\n")
+    print("For each method the cases where a warning or a refusal is due (all refusals count) and those")
+    print("where it was not given; the harmless cases, and the share of them that were warned of; and the")
+    print("median of mean height_std over mean |dz|.\n")
     rows = []
     for method in METHODS:
         of = [(key, found[method]) for key, found in results.items()]
