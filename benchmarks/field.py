@@ -16,6 +16,7 @@ which its user would not know. The process takes MOST_CONTACTS of them, and make
 that from the object alone.
 """
 
+import sys
 from itertools import product
 from pathlib import Path
 
@@ -122,7 +123,7 @@ def main():
     rows = []
     for path in sorted(p for p in options.folder.glob("*.ply") if options.only in p.stem):
         rows.append(row(path, options.tolerance))
-        print(" | ".join(rows[-1]), flush=True)
+        print(*rows[-1], file=sys.stderr, flush=True)
     means = [f"{np.mean([float(cells[i]) for cells in rows]):.2f}" for i in range(7, 13)]
     rows.append(["mean", *6 * [""], *means])
     head = "object|status|touches|contacts|length|s|open edges|IoU, %|Chamfer"
