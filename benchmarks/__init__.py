@@ -5,6 +5,7 @@
 Each process computes on one thread.
 """
 
+import argparse
 import os
 import platform
 import shutil
@@ -12,7 +13,7 @@ import subprocess
 import sys
 from importlib.metadata import version
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 
 for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR"):
     os.environ[f"{library}_NUM_THREADS"] = "1"  # numpy reads this once, on import.
@@ -59,11 +60,19 @@ def machine(*packages):
     return ", ".join([f"one thread, {cpu}; Python {platform.python_version()}", *versions])
 
 
+def parser_of(text, takes_zip=False):
+    """The parser of the command with this docstring, which may take the built extension first."""
+    parser = argparse.ArgumentParser(description=text.splitlines()[0])
+    if takes_zip:
+        parser.add_argument("zip", type=Path, metavar="ZIP", help="the built extension")
+    return parser
+
+
 def timed(run, *args, **kwargs):
-    """(seconds that a call takes, what it returns)."""
-    start = perf_counter()
+    """(seconds of the processor that a call takes, what it returns)."""
+    start = process_time()
     value = run(*args, **kwargs)
-    return perf_counter() - start, value
+    return process_time() - start, value
 
 
 def table(head, rows, left=1):

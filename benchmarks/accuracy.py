@@ -15,7 +15,6 @@ The error is the mean |dz| over some 300 points of the true surface above the do
 the frame that it found itself, the peers in the paper's. Lengths are in mm, errors in micrometers.
 """
 
-import argparse
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -30,7 +29,7 @@ from core import SamplingPlane, reconstruct, track
 from core.patch.domain import closed_spline_domain
 from tests import surfaces
 
-from . import machine, table
+from . import machine, parser_of, table
 from .peers import Fit, gaussian_process, jet, radial_basis
 
 # Each surface with the extent of its half curves. The sizes make the peers' errors like those that were
@@ -85,6 +84,12 @@ class Case(NamedTuple):
 # What was touched ------------------------------------------------------------------------------------
 
 
+def sampling(azimuths=(0.0, 60.0, 120.0), tilts=(0.0,), turn=0.0):
+    """Sampling planes of azimuths that are all turned, and of tilts, in degrees."""
+    angles = np.broadcast_arrays(np.radians(np.add(azimuths, turn)), np.radians(tilts))
+    return [SamplingPlane(*pair) for pair in zip(*angles, strict=True)]
+
+
 def exact_case(name, planes, noise, seed):
     surface, extent = SURFACES[name]
     return _touched(surface, planes, noise, seed, extent, TURN)
@@ -93,10 +98,9 @@ def exact_case(name, planes, noise, seed):
 def _touched(surface, planes, noise, seed, extent, turn):
     """The Case, or None where a curve ends early or the surface is no graph over the domain."""
     axes, kappas = darboux(surface)
-    azimuths, tilts = (np.radians(angles) for angles in PLANES[planes])
-    sampling = [SamplingPlane(a + np.radians(turn), t) for a, t in zip(azimuths, tilts, strict=True)]
     lengths = {"extent": extent, "step": extent / STEPS, "tangent": axes[:, 0]}
-    contours = track(surface, surface.point, axes[:, 2], sampling, noise=noise, rng=seed, **lengths)
+    cuts = sampling(*PLANES[planes], turn)
+    contours = track(surface, surface.point, axes[:, 2], cuts, noise=noise, rng=seed, **lengths)
     if any(contour.stops != ("extent", "extent") for contour in contours):
         return None
     domain = domain_of(contours, surface.point, axes, extent)
@@ -376,7 +380,7 @@ def random_table(scores):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__)
     parser.add_argument("--seeds", type=int, default=10, help="of the noise on exact surfaces (%(default)s)")
     parser.add_argument("--shapes", type=int, default=300, help="number of random shapes (%(default)s)")
     options = parser.parse_args()

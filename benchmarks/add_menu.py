@@ -12,10 +12,8 @@ Open edges, Euler number and pieces are of the touched surface, and in brackets 
 differ; vertices of the object in the same place, as those of a converted text, count as one.
 """
 
-import argparse
 import math
-from pathlib import Path
-from time import process_time
+import sys
 
 import numpy as np
 from PIL import Image
@@ -23,7 +21,7 @@ from PIL import Image
 from tests.solids import topology
 from tools import blender, demo
 
-from . import ROOT, machine, scan_files, table
+from . import ROOT, machine, parser_of, scan_files, table, timed
 
 APART, SIZE = 1.1, 1.05  # The distance of objects in the picture, and the length of their diagonals.
 COLUMNS, WIDTH, SAMPLES = 6, 1800, 48
@@ -92,9 +90,8 @@ def touched(add):
         obj.hide_set(True)
     add()
     source = bpy.context.object
-    start = process_time()
-    bpy.ops.tactile.touch_all_over(target=source.name)
-    return source, bpy.context.view_layer.objects.active, process_time() - start
+    seconds, _ = timed(bpy.ops.tactile.touch_all_over, target=source.name)
+    return source, bpy.context.view_layer.objects.active, seconds
 
 
 def expected(addon, add):
@@ -186,33 +183,45 @@ def draw(pairs, name):
         picture.convert("RGB").save(path.with_suffix(".jpg"), quality=88)
 
 
+def print_touched(adds, picture):
+    """Prints and draws the objects that functions add, by name, with reports that are not ok and refusals."""
+    import bpy
+
+    rows, pairs, messages = [], [], []
+    with blender.quiet():
+        bpy.ops.wm.read_homefile(use_empty=True)
+        for name, add in adds.items():
+            try:
+                source, made, seconds = touched(add)
+            except RuntimeError as error:
+                messages.append(f"{name}: {str(error).strip()}")
+                continue
+            rows.append(row(name, source, made, seconds))
+            message = made["tactile_object"]["message"]
+            print(*rows[-1], message, file=sys.stderr, flush=True)
+            messages += [f"{name}: {message}"] if rows[-1][-1] != "ok" else []
+            pairs.append((source, made))
+        draw(pairs, picture)
+    table(["object", "touches", "open / Euler / pieces", "mean", "largest", "CPU s", "status"], rows)
+    print("\n\n".join(messages), end="\n\n" if messages else "")
+
+
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("zip", type=Path, help="the built extension")
+    parser = parser_of(__doc__, takes_zip=True)
     parser.add_argument("--only", default="", help="only objects with this in their names")
     parser.add_argument("--scans", action="store_true", help="a cube, a bottle and a pear instead")
     parser.add_argument("--expected", action="store_true", help="print only what the dialog expects")
     options = parser.parse_args()
-    rows, pairs = [], []
-    with blender.quiet():
-        addon = blender.start(options.zip).tactile_addon
-        import bpy
-
-        bpy.ops.wm.read_homefile(use_empty=True)
-        if options.expected:
-            found = ((name, *expected(addon, add)) for name, add in shapes().items())
-            rows = [[name, f"{touches}", f"{seconds:.0f}"] for name, touches, seconds, *_ in found]
+    addon = blender.start(options.zip).tactile_addon
+    adds = scans() if options.scans else shapes()
     if options.expected:
+        with blender.quiet():
+            found = [(name, *expected(addon, add)) for name, add in adds.items()]
+        rows = [[name, f"{touches}", f"{seconds:.0f}"] for name, touches, seconds, *_ in found]
         table(["object", "touches expected", "seconds expected"], rows)
         return
-    with blender.quiet():
-        for name, add in (scans() if options.scans else shapes()).items():
-            if options.only in name:
-                source, made, seconds = touched(add)
-                rows.append(row(name, source, made, seconds))
-                pairs.append((source, made))
-        draw(pairs, "touched" if options.scans else "add_menu")
-    table(["object", "touches", "open / Euler / pieces", "mean", "largest", "CPU s", "status"], rows)
+    some = {name: add for name, add in adds.items() if options.only in name}
+    print_touched(some, "touched" if options.scans else "add_menu")
     print(f"{machine('bpy', 'numpy', 'scipy')}.")
 
 

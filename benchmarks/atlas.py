@@ -17,15 +17,11 @@ command prints Markdown tables:
 thin walls and several pieces, each from several starts (benchmarks.atlas_shapes).
 """
 
-import argparse
-from time import process_time
-
 import numpy as np
 
 from tests import solids
-from tools import blender
 
-from . import machine, scan_files, table
+from . import machine, parser_of, scan_files, table, timed
 from .atlas_shapes import print_shapes
 from .real import Scan
 from .whole import EDGE, away, contacts_of, touched_all_over, tree_of
@@ -80,15 +76,6 @@ def three(off):
     return f"{off.mean():.3f} / {np.median(off):.3f} / {np.percentile(off, 95):.2f}"
 
 
-def explored(thing, tolerance):
-    """(atlas, explorations, CPU seconds of touching and joining, CPU seconds of meshing, mesh)."""
-    start = process_time()
-    atlas, found, _ = touched_all_over(thing, thing.start, thing.outward, tolerance, most=MOST, rng=0)
-    touched = process_time()
-    mesh = atlas.mesh(EDGE)
-    return atlas, found, touched - start, process_time() - touched, mesh
-
-
 def angle_defects(mesh):
     """K at the vertices (n,) of a mesh: what their angles lack of a whole turn, over a third of the area."""
     turns, areas = np.full(len(mesh.vertices), 2.0 * np.pi), np.zeros(len(mesh.vertices))
@@ -116,7 +103,9 @@ def curved(thing, tolerance, atlas, mesh):
 
 def row(thing, tolerance):
     """A row of the first table, and the rows of the second table."""
-    atlas, found, touching, meshing, mesh = explored(thing, tolerance)
+    start = thing.start, thing.outward
+    touching, (atlas, found, _) = timed(touched_all_over, thing, start, tolerance, most=MOST, rng=0)
+    meshing, mesh = timed(atlas.mesh, EDGE)
     distance, std = atlas.distance(thing.points)
     felt = np.isfinite(std)
     off = off_mesh(mesh.vertices, mesh.triangles, thing.points)
@@ -130,7 +119,7 @@ def row(thing, tolerance):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__)
     parser.add_argument("--only", default="", help="only objects with this in their names")
     parser.add_argument("--finest", type=float, default=min(TOLERANCES), help="tolerance (%(default)s)")
     parser.add_argument("--coarsest", type=float, default=max(TOLERANCES), help="tolerance (%(default)s)")
@@ -147,8 +136,7 @@ def main():
     names = [name for name in (*SCANS, "ring", "egg") if options.only in name]
     rows, bends = [], []
     for name in names:
-        with blender.quiet():
-            thing = Scanned(name) if name in SCANS else Exact(name)
+        thing = Scanned(name) if name in SCANS else Exact(name)
         for tolerance in (t for t in TOLERANCES if options.finest <= t <= options.coarsest):
             cells, curvatures = row(thing, tolerance)
             rows.append(cells)

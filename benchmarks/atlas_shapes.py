@@ -17,18 +17,28 @@ than SURE deviations. Screened Poisson has the contacts on the curves of the sam
 """
 
 import sys
-from time import process_time
 from typing import NamedTuple
 
 import numpy as np
 
 import core
+from core.triangles import triangle_cross
 from tests import solids
-from tools import blender
 
-from . import machine, scan_files, table
+from . import machine, scan_files, table, timed
 from .real import Scan
-from .whole import EDGE, NOISE, away, contacts_of, poisson, put_together, spread, touched_all_over, tree_of
+from .whole import (
+    EDGE,
+    NOISE,
+    Rays,
+    away,
+    contacts_of,
+    poisson,
+    put_together,
+    spread,
+    touched_all_over,
+    tree_of,
+)
 
 TOLERANCES = (0.002, 0.008)
 THINNEST = 10.0  # Objects are touched with a tolerance if no wall is thinner than this many of it.
@@ -46,24 +56,31 @@ DEPTH, WEIGHT = 8, 4.0  # The settings of screened Poisson.
 WAYS = ((0.36, 0.48, 0.8), (-0.64, 0.6, -0.48), (0.28, -0.96, 0.02))
 
 
-class Made:
-    """A mesh of size 1 that answers rays."""
+class Made(Rays):
+    """A mesh of size 1."""
 
     def __init__(self, name, vertices, triangles):
         vertices = np.asarray(vertices, dtype=float)
         self.name, self.triangles = name, np.asarray(triangles)
         self.vertices = vertices / np.ptp(vertices, axis=0).max()
-        self.tree, self.topology = tree_of(self.vertices, self.triangles), solids.topology(self.triangles)
-
-    def ray_cast(self, origin, direction, distance):
-        hit, normal, _, _ = self.tree.ray_cast(origin, direction, distance)
-        return None if hit is None else (tuple(hit), tuple(normal))
+        self.topology = solids.topology(self.triangles)
+        super().__init__(self.vertices, self.triangles)
 
     def start(self, number):
         """The middle of a random face and the normal there, (3,) each."""
-        across, areas = _across(self.vertices, self.triangles)
+        corners = self.vertices[self.triangles]
+        across = triangle_cross(corners)
+        areas = np.linalg.norm(across, axis=1)
         face = np.random.default_rng(100 + number).choice(len(areas), p=areas / areas.sum())
-        return self.vertices[self.triangles[face]].mean(axis=0), across[face] / (2.0 * areas[face])
+        return corners[face].mean(axis=0), across[face] / areas[face]
+
+    def points(self, count, seed):
+        """Random points (count, 3) by area, and the normals (count, 3) there."""
+        return core.scattered(self.vertices, self.triangles, count, np.random.default_rng(seed))
+
+    def distances(self, places):
+        """Distances (n,) of places (n, 3), which are negative inside."""
+        return away(self.tree, places) * np.where(self.is_inside(places), -1.0, 1.0)
 
     def is_inside(self, points):
         """Whether points (n, 3) are inside: so say two of three rays, by the walls that they cross."""
@@ -77,20 +94,9 @@ class Made:
         return count
 
 
-def _across(vertices, triangles):
-    """Normals (n, 3) of triangles, as long as twice their areas, and these areas (n,)."""
-    a, b, c = vertices[triangles].transpose(1, 0, 2)
-    across = np.cross(b - a, c - a)
-    return across, 0.5 * np.linalg.norm(across, axis=1)
-
-
-def scattered(vertices, triangles, count, seed):
-    """Points (count, 3) of a mesh, random by area, and the triangles (count,) that they are on."""
-    rng, (_, areas) = np.random.default_rng(seed), _across(vertices, triangles)
-    face = rng.choice(len(areas), count, p=areas / areas.sum())
-    u, v = np.sort(rng.uniform(size=(2, count)), axis=0)
-    weights = np.stack([u, v - u, 1.0 - v], axis=1)
-    return np.einsum("ni,nij->nj", weights, vertices[triangles[face]]), face
+def things(makers, only):
+    """Yields the objects of functions by name, those with `only` in their names."""
+    yield from (Made(name, *make()) for name, make in makers.items() if only in name)
 
 
 # Objects ---------------------------------------------------------------------------------------------
@@ -159,13 +165,8 @@ def revolved(profile, is_ring=False, sections=SECTIONS):
     profile = np.array(profile, dtype=float)
     turns = 2.0 * np.pi * np.arange(sections) / sections
     radius, height = profile.T
-    vertices = np.column_stack(
-        [
-            np.outer(radius, np.cos(turns)).ravel(),
-            np.outer(radius, np.sin(turns)).ravel(),
-            np.repeat(height, sections),
-        ]
-    )
+    x, y = (np.outer(radius, function(turns)).ravel() for function in (np.cos, np.sin))
+    vertices = np.column_stack([x, y, np.repeat(height, sections)])
     index = np.arange(len(vertices)).reshape(-1, sections)
     index[radius == 0.0] = index[radius == 0.0, :1]  # On the axis there is one vertex only.
     index = np.vstack([index, index[:1]]) if is_ring else index
@@ -285,32 +286,25 @@ class Run(NamedTuple):
 def touched(thing, tolerance, number):
     """(atlas, explorations, number of touches made) of a start."""
     if thing.name == HOLLOW:
-        points, face = scattered(thing.vertices, thing.triangles, 20 * SHELLS, number)
-        some = spread(points, SHELLS)
-        across, areas = _across(thing.vertices, thing.triangles)
-        normals = across[face[some]] / (2.0 * areas[face[some], None])
+        tried = thing.points(20 * SHELLS, number)
+        some = spread(tried[0], SHELLS)
         wanted = {"farthest": 0.3, "largest_std": tolerance, "noise": NOISE, "rng": number}
-        found = core.explore_many(thing, points[some], normals, **wanted)
+        found = core.explore_many(thing, *(values[some] for values in tried), **wanted)
         found = [e for e in found if not isinstance(e, ValueError)]
         return put_together(found, tolerance), found, SHELLS
-    return touched_all_over(thing, *thing.start(number), tolerance, rng=number)
+    return touched_all_over(thing, thing.start(number), tolerance, rng=number)
 
 
 def apart(thing, vertices, triangles):
     """Distances of points of an object from a mesh, and of points of the mesh from the object."""
-    ways = (
-        (tree_of(vertices, triangles), (thing.vertices, thing.triangles)),
-        (thing.tree, (np.asarray(vertices), np.asarray(triangles))),
-    )
-    return [away(tree, scattered(*mesh, SAMPLES, 0)[0]) for tree, mesh in ways]
+    back = core.scattered(vertices, triangles, SAMPLES, np.random.default_rng(0))[0]
+    return away(tree_of(vertices, triangles), thing.points(SAMPLES, 0)[0]), away(thing.tree, back)
 
 
 def run(thing, tolerance, number, around, truth):
     """The Run of a start; `truth` are the signed distances of the places `around`."""
-    start = process_time()
-    atlas, found, done = touched(thing, tolerance, number)
-    mesh = atlas.mesh(EDGE)
-    seconds = process_time() - start
+    touching, (atlas, found, done) = timed(touched, thing, tolerance, number)
+    meshing, mesh = timed(atlas.mesh, EDGE)
     shape = solids.topology(mesh.triangles)
     there, back = (d / tolerance for d in apart(thing, mesh.vertices, mesh.triangles))
     distance, std = atlas.distance(around)
@@ -328,7 +322,7 @@ def run(thing, tolerance, number, around, truth):
         max(there.max(), back.max()),
         done,
         len(atlas.patches),
-        seconds,
+        touching + meshing,
         int(signs.sum()),
         felt.mean(),
         np.mean(off <= 1.645 * std) if len(std) else np.nan,
@@ -402,15 +396,11 @@ def print_shapes(only, tolerances, starts, places):
     """
     rows = []
     for tolerance in (t for t in TOLERANCES if tolerances[0] <= t <= tolerances[1]):
-        for name, make in made(tolerance).items():
-            if only not in name:
-                continue
-            with blender.quiet():
-                thing = Made(name, *make())
-            print(f"{name}, tolerance {tolerance:g}, {thing.topology}", file=sys.stderr, flush=True)
+        for thing in things(made(tolerance), only):
+            print(f"{thing.name}, tolerance {tolerance:g}, {thing.topology}", file=sys.stderr, flush=True)
             low, high = thing.vertices.min(axis=0) - 0.1, thing.vertices.max(axis=0) + 0.1
             around = np.random.default_rng(0).uniform(low, high, (places, 3))
-            truth = away(thing.tree, around) * np.where(thing.is_inside(around), -1.0, 1.0)
+            truth = thing.distances(around)
             runs = []
             for number in starts:
                 try:
@@ -421,7 +411,5 @@ def print_shapes(only, tolerances, starts, places):
                 print(line(runs[-1]), file=sys.stderr, flush=True)
             rows.append(row(thing, tolerance, runs, len(starts) - len(runs)))
     table(HEAD, rows, left=2)
-    print(
-        "Distances are in tolerances, times in CPU seconds; of several runs there is the worst, or the range."
-    )
+    print("Distances are in tolerances, times in CPU seconds; of several runs it has the worst or the range.")
     print(f"{machine('bpy', 'numpy', 'scipy')}.")

@@ -9,21 +9,19 @@ noise levels of benchmarks.accuracy (`--quick` takes one plane set and one seed)
 by case, in one process on one thread.
 """
 
-import argparse
 import sys
 from functools import cache, partial
 from importlib.util import find_spec
 from itertools import groupby
 from statistics import median
-from time import process_time
 from typing import NamedTuple
 
 import numpy as np
 
-from core import SamplingPlane, explore, track
+from core import explore, track
 from tools import blender
 
-from . import accuracy, machine, peers, plot
+from . import accuracy, machine, parser_of, peers, plot, timed
 
 QUICK_PLANES = accuracy.EXACT_PLANES[:1]
 SEEDS = 4  # The number of seeds of the noise in the full run.
@@ -142,13 +140,11 @@ def touch_of(name, planes, noise, seed):
     contours = {3: case.contours}
     lengths = {"extent": extent, "step": extent / accuracy.STEPS, "tangent": case.axes[:, 0], "noise": noise}
     for count in (4, 5):
-        azimuths = np.pi * np.arange(count) / count + np.radians(accuracy.TURN)
-        sampling = [SamplingPlane(azimuth) for azimuth in azimuths]
-        contours[count] = track(surface, case.point, case.axes[:, 2], sampling, rng=number, **lengths)
-    azimuths, tilts = (np.radians(angles) for angles in accuracy.PLANES[planes])
-    sampling = [SamplingPlane(a + np.radians(accuracy.TURN), t) for a, t in zip(azimuths, tilts, strict=True)]
+        cuts = accuracy.sampling(180.0 / count * np.arange(count), turn=accuracy.TURN)
+        contours[count] = track(surface, case.point, case.axes[:, 2], cuts, rng=number, **lengths)
+    cuts = accuracy.sampling(*accuracy.PLANES[planes], accuracy.TURN)
     sensor = {"farthest": extent, "tangent": case.axes[:, 0], "noise": noise, "rng": number}
-    explored = partial(explore, remembering, case.point, case.axes[:, 2], sampling, **sensor)
+    explored = partial(explore, remembering, case.point, case.axes[:, 2], cuts, **sensor)
     return Touch(case, contours, explored)
 
 
@@ -180,15 +176,9 @@ def typical(run):
 
     The time of a quick call is the median of three more calls.
     """
-
-    def timed():
-        start = process_time()
-        found = run()
-        return process_time() - start, found
-
-    seconds, found = timed()
+    seconds, found = timed(run)
     if seconds < REPEATED:
-        seconds = median(timed()[0] for _ in range(3))
+        seconds = median(timed(run)[0] for _ in range(3))
     return seconds, found
 
 
@@ -369,7 +359,7 @@ def caption_of(methods, quick):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__)
     parser.add_argument("--quick", action="store_true", help="one plane set and seed")
     options = parser.parse_args()
     methods = available(METHODS)

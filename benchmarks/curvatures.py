@@ -18,7 +18,6 @@ interval, and of curvatures off by more than five deviations, and by more than .
 has root mean squares, `std` and `error` are medians in 1e-3 / L, `at point` is that of height_std in 1e-3 L.
 """
 
-import argparse
 import math
 from collections import defaultdict
 from contextlib import suppress
@@ -29,12 +28,12 @@ from itertools import product
 
 import numpy as np
 
-from core import Contour, SamplingPlane, common_point, explore, reconstruct, track
+from core import Contour, common_point, explore, reconstruct, track
 from core.patch.monge import exponents, monomials
 from tests import surfaces
 
-from . import SCANS_FOLDER, accuracy, machine, table
-from .accuracy import EXACT_PLANES, PLANES, STEPS, SURFACES, above, darboux
+from . import SCANS_FOLDER, accuracy, machine, parser_of, table
+from .accuracy import EXACT_PLANES, PLANES, STEPS, SURFACES, above, darboux, sampling
 
 TOUCHES, ON_SCANS, HOLD_OUT = 200, 600, 90
 WITHIN, FAR, LARGE = 1.645, 5.0, 0.03  # The 90 % interval, and far off: in deviations and in 1 / L.
@@ -80,10 +79,11 @@ def row(name, touches):
 
 def felt(surface, extent, planes, rng, noise=0.0, steps=STEPS):
     """Contours of an exact surface through its point, in one of PLANES turned by a random angle."""
-    turn, (azimuths, tilts) = rng.uniform(0.0, math.pi), np.radians(PLANES[planes])
-    sampling = [SamplingPlane(a + turn, t) for a, t in zip(azimuths, tilts, strict=True)]
-    lengths = {"extent": extent, "step": extent / steps}
-    return track(surface, surface.point, surface.normal, sampling, noise=noise, rng=rng, **lengths)
+    lengths, cuts = (
+        {"extent": extent, "step": extent / steps},
+        sampling(*PLANES[planes], rng.uniform(0.0, 180.0)),
+    )
+    return track(surface, surface.point, surface.normal, cuts, noise=noise, rng=rng, **lengths)
 
 
 def exact(seed, noise, noise_is_given=True):
@@ -136,9 +136,8 @@ def fold(seed, angle, is_automatic=False, has_normals=True, k=0.0):
         lambda p: np.array([slope * np.sign(p[0]) * (abs(p[0]) > TOP) - k * p[0], -k * p[1], 1.0]),
         *(np.array([x, y, 0.5 * k * (x * x + y * y)]), 0.0, 0.0),
     )
-    turn, extent = rng.uniform(0.0, math.pi), rng.uniform(0.4, 1.0)
+    planes, extent = sampling(turn=rng.uniform(0.0, 180.0)), rng.uniform(0.4, 1.0)
     lengths = {"farthest": 1.5} if is_automatic else {"extent": extent}
-    planes = [SamplingPlane(turn + math.pi * i / 3) for i in range(3)]
     r = explore(surface, surface.point, surface.normal, planes, **lengths).result
     bare = [replace(contour, normals=None) for contour in r.contours]
     return surface, r if has_normals else reconstruct(surface.point, bare, outward=surface.normal)
@@ -147,13 +146,12 @@ def fold(seed, angle, is_automatic=False, has_normals=True, k=0.0):
 def cone(seed):
     """A flat cone, touched near its tip with an automatic extent."""
     rng = np.random.default_rng(seed)
-    slope, away, turn = rng.uniform(0.1, 0.7), rng.uniform(0.2, 0.9), rng.uniform(0.0, math.pi)
+    slope, away, planes = rng.uniform(0.1, 0.7), rng.uniform(0.2, 0.9), sampling(turn=rng.uniform(0.0, 180.0))
     surface = surfaces.Exact(
         lambda x, y, z: z + slope * np.hypot(x, y),
         lambda p: np.array([*(slope * p[:2] / math.hypot(*p[:2])), 1.0]),
         *(np.array([away, 0.0, -slope * away]), 0.0, 0.0),
     )
-    planes = [SamplingPlane(turn + math.pi * i / 3) for i in range(3)]
     return surface, explore(surface, surface.point, surface.normal, planes, farthest=2.0).result
 
 
@@ -225,9 +223,9 @@ def scan_touches(scan, count):
     """Yields what the names of rows begin with, and a fit, at `count` places of a scan."""
     for point, up in scan.places(count, 0):
         for planes, share in product(SCAN_PLANES, EXTENTS):
-            azimuths = [SamplingPlane(math.pi * i / planes) for i in range(planes)]
+            cuts = sampling(180.0 / planes * np.arange(planes))
             with suppress(ValueError):  # There is an edge or a hole.
-                contours = track(scan, point, up, azimuths, extent=1.0 / share, step=1.0 / share / STEPS)
+                contours = track(scan, point, up, cuts, extent=1.0 / share, step=1.0 / share / STEPS)
                 yield f"scans, {planes} planes", reconstruct(point, contours, outward=up)
         with suppress(ValueError):
             yield "scans, automatic", explore(scan, point, up, farthest=0.5).result
@@ -235,12 +233,11 @@ def scan_touches(scan, count):
 
 def scan_rows(count):
     """{name: touches} of all scans, about `count` for each number of planes."""
-    from .real import Scan, blender
+    from .real import Scan
 
     rows, paths = defaultdict(list), sorted(SCANS_FOLDER.glob("*.*"))
     for path in paths:
-        with blender.quiet():
-            scan = Scan(path)
+        scan = Scan(path)
         for name, r in scan_touches(scan, max(1, round(count / len(paths) / len(EXTENTS)))):
             for kind, of in by_truth(scan, r):
                 rows[f"{name}, {kind}"].append(of)
@@ -248,7 +245,7 @@ def scan_rows(count):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__)
     parser.add_argument("--quick", action="store_true", help="a tenth of the touches")
     part = 10 if parser.parse_args().quick else 1
     rows = {n: [on_surface(touch, seed) for seed in range(TOUCHES // part)] for n, touch in ROWS.items()}

@@ -20,10 +20,10 @@ modifier, where patches of the same radius and of half of it agree. A sure one i
 more than .1 / L and two deviations that the contacts alone have.
 """
 
-import argparse
 import math
 from collections import defaultdict
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -32,7 +32,7 @@ import numpy as np
 from tests.surfaces import ellipsoid
 from tools import blender
 
-from . import machine, table
+from . import machine, parser_of, table
 from .paper import AZIMUTHS
 
 POINTS = 60
@@ -45,32 +45,28 @@ FINEST, AGREE = 5, 0.15  # Suzanne's curvatures are those of these levels where 
 
 def shapes(add):
     """(kind, adds the shape, the principal curvatures at a point of it), with bpy.ops.mesh as `add`."""
-    ball = (-1.0, -1.0)
+
+    def on_ball(p):
+        return -1.0, -1.0
+
+    def on_torus(p):
+        return -4.0, -4.0 * (1.0 - 1.0 / math.hypot(p[0], p[1]))
+
+    def on_cylinder(p):
+        return -1.0 if abs(p[2]) < TOP else 0.0, 0.0
+
+    def on_cone(p):
+        return -2.0 / math.sqrt(5.0) / math.hypot(p[0], p[1]) if p[2] > -TOP else 0.0, 0.0
+
     for segments, rings in ((16, 8), (32, 16), (64, 32), (16, 64)):
-        yield (
-            "balls",
-            lambda s=segments, r=rings: add.primitive_uv_sphere_add(segments=s, ring_count=r),
-            lambda _: ball,
-        )
+        yield "balls", partial(add.primitive_uv_sphere_add, segments=segments, ring_count=rings), on_ball
     for level in (2, 3, 4):
-        yield "balls", lambda n=level: add.primitive_ico_sphere_add(subdivisions=n), lambda _: ball
+        yield "balls", partial(add.primitive_ico_sphere_add, subdivisions=level), on_ball
     for major, minor in ((48, 12), (96, 24), (192, 48), (16, 48)):
-        yield (
-            "tori",
-            lambda a=major, b=minor: add.primitive_torus_add(major_segments=a, minor_segments=b),
-            lambda p: (-4.0, -4.0 * (1.0 - 1.0 / math.hypot(p[0], p[1]))),
-        )
+        yield "tori", partial(add.primitive_torus_add, major_segments=major, minor_segments=minor), on_torus
     for count in (16, 32, 64):
-        yield (
-            "cylinders",
-            lambda n=count: add.primitive_cylinder_add(vertices=n),
-            lambda p: (-1.0 if abs(p[2]) < TOP else 0.0, 0.0),
-        )
-        yield (
-            "cones",
-            lambda n=count: add.primitive_cone_add(vertices=n),
-            lambda p: (-2.0 / math.sqrt(5.0) / math.hypot(p[0], p[1]) if p[2] > -TOP else 0.0, 0.0),
-        )
+        yield "cylinders", partial(add.primitive_cylinder_add, vertices=count), on_cylinder
+        yield "cones", partial(add.primitive_cone_add, vertices=count), on_cone
 
 
 def scaled_balls(bpy):
@@ -88,11 +84,7 @@ def scaled_balls(bpy):
 
     for segments in (32, 64):
         for height in (0.15, 0.3, 0.5, 2.0):
-            yield (
-                "balls, scaled",
-                lambda s=segments, h=height: add(s, h),
-                lambda p, h=height: exact(p, h),
-            )
+            yield "balls, scaled", partial(add, segments, height), partial(exact, height=height)
 
 
 def suzanne(bpy, levels):
@@ -154,12 +146,10 @@ def deviation(r):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("zip", type=Path, metavar="ZIP")
+    parser = parser_of(__doc__, takes_zip=True)
     parser.add_argument("--models", type=Path, metavar="FOLDER")
     arguments = parser.parse_args()
-    with blender.quiet():
-        extension = blender.start(arguments.zip)
+    extension = blender.start(arguments.zip)
     import bpy
 
     planes = [extension.core.SamplingPlane(math.radians(azimuth)) for azimuth in AZIMUTHS]

@@ -16,19 +16,18 @@ which its user would not know. The process takes MOST_CONTACTS of them, and make
 that from the object alone.
 """
 
-import argparse
+import sys
 from itertools import product
 from pathlib import Path
-from time import process_time
 
 import numpy as np
 from scipy.spatial.distance import cdist
 
+import core
 from tests import solids
-from tools import blender
 
-from . import machine, table
-from .atlas_shapes import Made, scattered
+from . import machine, parser_of, table, timed
+from .atlas_shapes import Made
 from .real import Scan
 from .whole import EDGE, away, contacts_of, poisson, touched_all_over, tree_of
 
@@ -64,8 +63,8 @@ def iou(one, other):
 
 def chamfer(thing, vertices, triangles):
     """The mean of both mean distances, in permille, between an object and a mesh."""
-    on_object = scattered(thing.vertices, thing.triangles, POINTS, 1)[0]
-    on_mesh = scattered(vertices, triangles, POINTS, 2)[0]
+    on_object = thing.points(POINTS, 1)[0]
+    on_mesh = core.scattered(vertices, triangles, POINTS, np.random.default_rng(2))[0]
     there, back = away(tree_of(vertices, triangles), on_object), away(thing.tree, on_mesh)
     return 500.0 * (there.mean() + back.mean())
 
@@ -79,7 +78,7 @@ def meshed(thing, places, truth, vertices, triangles):
 
 def best_of_the_peers(thing, places, truth, contacts):
     """(IoU, distance) of Poisson and of the process, each at its best setting."""
-    on_object = scattered(thing.vertices, thing.triangles, POINTS, 1)[0]
+    on_object = thing.points(POINTS, 1)[0]
     surfaces = [
         meshed(thing, places, truth, *poisson(*contacts, depth, weight))
         for depth, weight in product(DEPTHS, WEIGHTS)
@@ -91,14 +90,6 @@ def best_of_the_peers(thing, places, truth, contacts):
     return max(surfaces), max(processes)
 
 
-def touched(thing, tolerance):
-    """(atlas, explorations, CPU seconds with the mesh, mesh) of an object touched all over."""
-    start = process_time()
-    atlas, found, _ = touched_all_over(thing, *thing.start(0), tolerance, most=MOST_TOUCHES, rng=0)
-    mesh = atlas.mesh(EDGE)
-    return atlas, found, process_time() - start, mesh
-
-
 def length_of(found):
     """The length of all curves of explorations."""
     return sum(np.linalg.norm(np.diff(c.points, axis=0), axis=1).sum() for e in found for c in e.contours)
@@ -106,24 +97,25 @@ def length_of(found):
 
 def row(path, tolerance):
     """The cells of an object."""
-    with blender.quiet():
-        scan = Scan(path)
+    scan = Scan(path)
     thing = Made(path.stem, scan.points, scan.faces)
     low, high = thing.vertices.min(axis=0) - MARGIN, thing.vertices.max(axis=0) + MARGIN
     places = np.random.default_rng(0).uniform(low, high, (PLACES, 3))
     truth = thing.is_inside(places)
-    atlas, found, seconds, mesh = touched(thing, tolerance)
+    start = thing.start(0)
+    touching, (atlas, found, _) = timed(touched_all_over, thing, start, tolerance, most=MOST_TOUCHES, rng=0)
+    meshing, mesh = timed(atlas.mesh, EDGE)
     contacts = contacts_of(found, atlas.taps)
     ours = meshed(thing, places, truth, mesh.vertices, mesh.triangles)
-    cells = [path.stem, atlas.status, str(len(atlas.patches)), str(len(contacts[0]))]
-    cells += [f"{length_of(found):.0f}", f"{seconds:.0f}", str(solids.topology(mesh.triangles).open)]
+    counts = len(atlas.patches), len(contacts[0]), round(length_of(found)), round(touching + meshing)
+    cells = [path.stem, atlas.status, *map(str, counts), str(solids.topology(mesh.triangles).open)]
     for share, distance in (ours, *best_of_the_peers(thing, places, truth, contacts)):
         cells += [f"{100.0 * share:.2f}", f"{distance:.2f}"]
     return cells
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", default="", help="only objects with this in their names")
     parser.add_argument("--tolerance", type=float, default=0.002, help="of the size (%(default)s)")
@@ -131,7 +123,7 @@ def main():
     rows = []
     for path in sorted(p for p in options.folder.glob("*.ply") if options.only in p.stem):
         rows.append(row(path, options.tolerance))
-        print(" | ".join(rows[-1]), flush=True)
+        print(*rows[-1], file=sys.stderr, flush=True)
     means = [f"{np.mean([float(cells[i]) for cells in rows]):.2f}" for i in range(7, 13)]
     rows.append(["mean", *6 * [""], *means])
     head = "object|status|touches|contacts|length|s|open edges|IoU, %|Chamfer"

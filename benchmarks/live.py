@@ -14,9 +14,7 @@ live: the first touch, which builds that tree, and the end of a gesture, which m
 mesh.
 """
 
-import argparse
 import math
-from pathlib import Path
 from statistics import median
 from time import process_time
 
@@ -24,7 +22,7 @@ import numpy as np
 
 from tools import blender
 
-from . import machine, table
+from . import machine, parser_of, table, timed
 
 FACES = (10_000, 1_000_000)
 UPDATES, ENDS = 101, 7
@@ -63,33 +61,25 @@ class Clock:
     def wrap(self, owner, name, stage):
         inner = getattr(owner, name)
 
-        def timed(*args, **kwargs):
-            start = process_time()
-            try:
-                return inner(*args, **kwargs)
-            finally:
-                self.spent[stage] = self.spent.get(stage, 0.0) + process_time() - start
+        def counted(*args, **kwargs):
+            seconds, value = timed(inner, *args, **kwargs)
+            self.spent[stage] = self.spent.get(stage, 0.0) + seconds
+            return value
 
-        setattr(owner, name, timed)
+        setattr(owner, name, counted)
 
 
 def measure(bpy, update, clock, faces):
     """A row of the table in milliseconds: medians by stage, the first touch, and the end of a gesture."""
     obj = sheet(bpy, faces)
-    start = process_time()
-    bpy.ops.tactile.pick(target=obj.name, location=(0.2, 0.1, 0.05))
-    first = process_time() - start
+    first, _ = timed(bpy.ops.tactile.pick, target=obj.name, location=(0.2, 0.1, 0.05))
     probe = bpy.context.object
     (patch,) = probe.children
     chosen = median(run["all"] for run in updates(probe, clock))
     probe.tactile_probe.extent = patch["tactile"]["extent"]
     runs = updates(probe, clock)
-    ends, depsgraph = [], bpy.context.evaluated_depsgraph_get()
-    for _ in range(ENDS):
-        start = process_time()
-        update(probe, depsgraph, complete=True)
-        ends.append(process_time() - start)
-    once = (first, median(ends))
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    once = first, median(timed(update, probe, depsgraph, complete=True)[0] for _ in range(ENDS))
     stages = [median(run[stage] for run in runs) for stage in STAGES]
     cells = [*(f"{1e3 * seconds:.1f}" for seconds in (*stages, *once)), f"{chosen / stages[-1]:.1f}"]
     return [f"{len(obj.data.polygons)}", f"{len(patch.data.vertices)}", *cells]
@@ -107,11 +97,9 @@ def updates(probe, clock):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("zip", type=Path, metavar="ZIP")
+    parser = parser_of(__doc__, takes_zip=True)
     options = parser.parse_args()
-    with blender.quiet():
-        extension = blender.start(options.zip)
+    extension = blender.start(options.zip)
     import bpy
 
     addon, core, clock = extension.tactile_addon, extension.core, Clock()

@@ -22,21 +22,18 @@ parallel planes, seeded. It prints Markdown tables:
     the surface is off the object, and the object off the surface, in percent of the size.
 """
 
-import argparse
 import sys
 from itertools import product
-from time import process_time
 
 import numpy as np
 
 import core
 from core.atlas.orientation import doubts_of, oriented, planes_of
-from core.triangles import normalized
-from tools import blender
+from core.triangles import normalized, triangle_cross
 
-from . import machine, table
+from . import machine, parser_of, table, timed
+from .accuracy import sampling
 from .atlas_shapes import (
-    Made,
     angle,
     arc,
     away,
@@ -47,6 +44,7 @@ from .atlas_shapes import (
     revolved,
     square_ring,
     tee,
+    things,
 )
 from .whole import spread
 
@@ -136,9 +134,7 @@ def _stepped(thing, heights, keys, faces, step):
     which = np.clip(np.searchsorted(lengths, at) - 1, 0, len(faces) - 1)
     share = (at - lengths[which]) / np.maximum(lengths[which + 1] - lengths[which], 1e-12)
     points = corners[which] + share[:, None] * (corners[which + 1] - corners[which])
-    one, two, three = thing.vertices[thing.triangles[np.array(faces)[which]]].transpose(1, 0, 2)
-    normals = np.cross(two - one, three - one)
-    return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    return points, normalized(triangle_cross(thing.vertices[thing.triangles[np.array(faces)[which]]]))
 
 
 def kept(strokes, inside):
@@ -165,8 +161,7 @@ def partial(thing, strokes, rng):
     for number in rng.integers(1000, size=50).tolist():
         try:
             place, normal = thing.start(number)
-            planes = [core.SamplingPlane(a) for a in np.radians([0.0, 60.0, 120.0])]
-            contours = core.track(thing, place, normal, planes, extent=0.15, step=0.01)
+            contours = core.track(thing, place, normal, sampling(), extent=0.15, step=0.01)
         except ValueError:
             continue
         if all(len(c.points) > 25 for c in contours):
@@ -191,11 +186,9 @@ def scan(thing, seed, is_full):
 def judged(thing, seed, is_full):
     """A dict of what came of one scan."""
     kind, strokes, given = scan(thing, seed, is_full)
-    start = process_time()
     # Open strokes do not show their outer side.
     hint = None if kind in ("full", "half space") else np.vstack([n for _, n in strokes]).mean(axis=0)
-    atlas = core.atlas_of(given, noise=NOISE, outward=hint)
-    seconds = process_time() - start
+    seconds, atlas = timed(core.atlas_of, given, noise=NOISE, outward=hint)
     rng = np.random.default_rng(seed + 1)
     points, normals = (np.vstack(values) for values in zip(*strokes, strict=True))
     low, high = points.min(axis=0) - 1.0, points.max(axis=0) + 1.0
@@ -205,7 +198,7 @@ def judged(thing, seed, is_full):
     above = points[some] + rng.uniform(0.0, ABOVE, PLACES)[:, None] * normals[some]
     above = above[~thing.is_inside(above)]
     places = np.vstack([around, above])
-    truth = away(thing.tree, places) * np.where(thing.is_inside(places), -1.0, 1.0)
+    truth = thing.distances(places)
     distance, std = atlas.distance(places)
     finite = np.isfinite(std)
     wrong = finite & (np.signbit(distance) != np.signbit(truth))
@@ -231,14 +224,13 @@ def judged(thing, seed, is_full):
 
 
 def print_scans(only, seeds, is_full):
-    names = [name for name in OBJECTS if only in name]
-    with blender.quiet():
-        things = {name: Made(name, *OBJECTS[name]()) for name in names}
-    every = {name: [] for name in names}
+    objects = list(things(OBJECTS, only))
+    every = {thing.name: [] for thing in objects}
     for seed in seeds:
-        name = names[seed % len(names)]
+        thing = objects[seed % len(objects)]
+        name = thing.name
         try:
-            one = judged(things[name], 1000 * (1 + is_full) + seed // len(names) * 7 + seed, is_full)
+            one = judged(thing, 1000 * (1 + is_full) + seed // len(objects) * 7 + seed, is_full)
         except ValueError as error:
             print(f"{name} {seed}: {error}", file=sys.stderr, flush=True)
             continue
@@ -249,21 +241,16 @@ def print_scans(only, seeds, is_full):
         if not found:
             continue
         finite, even = (sum(one[key] for one in found) for key in ("finite", "even"))
-        rows.append(
-            [
-                name,
-                str(len(found)),
-                str(sum(one["ok"] for one in found)),
-                str(sum(one["closed"] for one in found)),
-                f"{finite / len(found):.0f}",
-                f"{1e3 * sum(one['wrong'] for one in found) / max(even, 1):.2f}",
-                f"{1e3 * sum(one['near wrong'] for one in found) / max(finite - even, 1):.2f}",
-                f"{1e3 * sum(one['sure wrong'] for one in found) / max(finite, 1):.2f}",
-                f"{100 * np.mean([one['felt above'] for one in found]):.1f}",
-                f"{np.mean([one['within'] for one in found]):.3f}",
-                f"{np.mean([one['seconds'] for one in found]):.1f}",
-            ]
+        counts = {"wrong": even, "near wrong": finite - even, "sure wrong": finite}
+        above, within, seconds = (
+            np.mean([one[key] for one in found]) for key in ("felt above", "within", "seconds")
         )
+        rows.append([
+            *(name, str(len(found)), *(str(sum(one[key] for one in found)) for key in ("ok", "closed"))),
+            f"{finite / len(found):.0f}",
+            *(f"{1e3 * sum(one[key] for one in found) / max(of, 1):.2f}" for key, of in counts.items()),
+            *(f"{100 * above:.1f}", f"{within:.3f}", f"{seconds:.1f}"),
+        ])  # fmt: skip
     head = [
         *("full scans of" if is_full else "partial scans of", "scans", "ok", "closed", "finite places"),
         *("wrong signs, permille", "near contacts", "sure ones", "% finite above", "within 90 %", "s"),
@@ -281,9 +268,7 @@ def profile(kind, points, middle, way):
 
 def print_features(only, first):
     rows = []
-    for name in (name for name in FEATURED if only in name):
-        with blender.quiet():
-            thing = Made(name, *OBJECTS[name]())
+    for thing in things({name: OBJECTS[name] for name in FEATURED}, only):
         for seed, (kind, noises) in enumerate(product(WIDTHS, HEIGHTS), start=first):
             rng = np.random.default_rng(seed)
             strokes = strokes_of(thing, rng.uniform(*GAPS), rng)
@@ -292,14 +277,13 @@ def print_features(only, first):
             ways = normalized(points - thing.vertices.mean(axis=0))
             height, inside = profile(kind, points, points[rng.integers(len(points))], rotation(rng)[0])
             felt = points + noises * NOISE * height[:, None] * ways + rng.normal(0.0, NOISE, points.shape)
-            start = process_time()
-            atlas = core.atlas_of(np.split(felt, np.cumsum([len(p) for p, _ in strokes])[:-1]), noise=NOISE)
-            seconds = process_time() - start
+            parts = np.split(felt, np.cumsum([len(p) for p, _ in strokes])[:-1])
+            seconds, atlas = timed(core.atlas_of, parts, noise=NOISE)
             distance, std = atlas.distance(felt)
             far = np.abs(distance) > SURE * np.hypot(np.where(np.isfinite(std), std, 0.0), NOISE)
             means = [f"{np.abs(distance[which]).mean() / NOISE:.2f}" for which in (inside, ~inside)]
             rows.append([
-                name, kind, str(noises), atlas.status, str(len(felt)), str(np.count_nonzero(inside)),
+                thing.name, kind, str(noises), atlas.status, str(len(felt)), str(np.count_nonzero(inside)),
                 f"{100.0 * far[inside].mean():.1f}", *means, str(len(atlas.patches)), f"{seconds:.1f}",
             ])  # fmt: skip
             print(*rows[-1], atlas.message, file=sys.stderr, flush=True)
@@ -309,11 +293,9 @@ def print_features(only, first):
 
 def print_even(only, first):
     rows = []
-    for name, count in product((name for name in OBJECTS if only in name), EVEN):
-        with blender.quiet():
-            thing = Made(name, *OBJECTS[name]())
-        rng, mesh = np.random.default_rng(first), (thing.vertices, thing.triangles)
-        object_points, tried = core.scattered(*mesh, CHECKED, rng)[0], core.scattered(*mesh, 10 * count, rng)
+    for thing, count in product(things(OBJECTS, only), EVEN):
+        rng, name = np.random.default_rng(first), thing.name
+        object_points, tried = thing.points(CHECKED, rng)[0], thing.points(10 * count, rng)
         points, normals = (values[spread(tried[0], count)] for values in tried)
         for some in (normals, None):
             try:
@@ -332,46 +314,40 @@ def print_even(only, first):
     table(["object", "even contacts", "normals", "status", "% surface off", "% object off"], rows)
 
 
-def oriented_strokes(thing, gap):
-    """Strokes so far apart: contacts, the share whose normals face outward, the doubt of these, seconds."""
-    rng = np.random.default_rng(0)
-    strokes = strokes_of(thing, gap, rng)
-    normals = np.vstack([n for _, n in strokes])
-    felt = [p + rng.normal(0.0, NOISE, p.shape) for p, _ in strokes]
-    start = process_time()
-    points = np.vstack(felt)
+def outward(points, normals):
+    """The share of contacts, (n, 3) with their true normals, that face outward, and the doubt of these."""
     planes = planes_of(points, NOISE)
     try:
         found = oriented(points, planes)
     except ValueError as error:
-        return felt, np.nan, f"refused: {error}", process_time() - start
+        return np.nan, f"refused: {error}"
     doubt = next(doubts_of(points, found, planes), None)
-    seconds = process_time() - start
-    return felt, np.mean(np.einsum("ni,ni->n", found, normals) > 0.0), doubt, seconds
+    return np.mean(np.einsum("ni,ni->n", found, normals) > 0.0), doubt
 
 
 def print_orientation(only, is_coarse):
     rows = []
-    for name, (wall, make) in objects(GAP).items():
-        if only not in name:
-            continue
-        with blender.quiet():
-            thing = Made(name, *make())
-        wall = WALLS.get(name, wall)
+    walls = {name: wall for name, (wall, _) in objects(GAP).items()} | WALLS
+    for thing in things({name: make for name, (_, make) in objects(GAP).items()}, only):
+        wall = walls[thing.name]
         gap = (COARSE if is_coarse else CLOSE) * 0.5 * wall
-        felt, right, doubt, seconds = oriented_strokes(thing, gap)
-        count = sum(map(len, felt))
+        rng = np.random.default_rng(0)
+        strokes = strokes_of(thing, gap, rng)
+        felt = [p + rng.normal(0.0, NOISE, p.shape) for p, _ in strokes]
+        points, normals = np.vstack(felt), np.vstack([n for _, n in strokes])
+        (seconds, (right, doubt)), count = timed(outward, points, normals), len(points)
         if is_coarse and doubt is None and right < RIGHT and FEWEST <= count <= MOST:
             atlas = core.atlas_of(felt, noise=NOISE)
             doubt = next(iter(atlas.doubts), None)
-        rows.append([name, f"{wall:g}", str(count), f"{100 * right:.2f}", str(doubt or ""), f"{seconds:.1f}"])
+        shares = f"{wall:g}", str(count), f"{100 * right:.2f}"
+        rows.append([thing.name, *shares, str(doubt or ""), f"{seconds:.1f}"])
         print(rows[-1], file=sys.stderr, flush=True)
     gaps = f"gaps of {COARSE if is_coarse else CLOSE:g} half walls"
     table([gaps, "wall", "contacts", "% outward", "doubt", "s"], rows)
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__)
     parser.add_argument("--partial", type=int, default=0)
     parser.add_argument("--full", type=int, default=0)
     parser.add_argument("--first", type=int, default=0)

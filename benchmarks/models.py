@@ -10,14 +10,13 @@ of each model that is not ok, and draws build/charts/models.jpg, models above an
 Columns are those of benchmarks.add_menu.
 """
 
-import argparse
-import sys
+from functools import partial
 from pathlib import Path
 
 from tools import blender
 
-from . import machine, table
-from .add_menu import draw, row, touched
+from . import machine, parser_of
+from .add_menu import print_touched
 
 
 def imported(path):
@@ -30,34 +29,15 @@ def imported(path):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("zip", type=Path, help="the built extension")
+    parser = parser_of(__doc__, takes_zip=True)
     parser.add_argument("folder", type=Path, help="the folder of models")
     parser.add_argument("--only", default="", help="only models with this in their names")
     options = parser.parse_args()
-    rows, messages, pairs = [], [], []
-    with blender.quiet():
-        blender.start(options.zip)
-        import bpy
-
-        bpy.ops.wm.read_homefile(use_empty=True)
-        for path in sorted(options.folder.iterdir()):
-            if path.suffix not in (".obj", ".ply", ".stl") or options.only not in path.name:
-                continue
-            try:
-                source, made, seconds = touched(lambda path=path: imported(path))
-            except RuntimeError as error:
-                messages.append(f"{path.stem}: {error}")
-                continue
-            rows.append(row(path.stem, source, made, seconds))
-            print(*rows[-1], made["tactile_object"]["message"], file=sys.stderr, flush=True)
-            if rows[-1][-1] != "ok":
-                messages.append(f"{path.stem}: {made['tactile_object']['message']}")
-            pairs.append((source, made))
-        draw(pairs, "models")
-    table(["model", "touches", "open / Euler / pieces", "mean", "largest", "CPU s", "status"], rows)
-    print("\n\n".join(messages))
-    print(f"\n{machine('bpy', 'numpy', 'scipy')}.")
+    blender.start(options.zip)
+    paths = [p for p in sorted(options.folder.iterdir()) if p.suffix in (".obj", ".ply", ".stl")]
+    adds = {path.stem: partial(imported, path) for path in paths if options.only in path.name}
+    print_touched(adds, "models")
+    print(f"{machine('bpy', 'numpy', 'scipy')}.")
 
 
 if __name__ == "__main__":

@@ -11,10 +11,8 @@ installed, reads the scans. The command prints Markdown:
 Without the scans, only exact surfaces are touched. Lengths are in mm.
 """
 
-import argparse
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +21,7 @@ import core
 from tests import surfaces
 from tools import blender
 
-from . import NO_SCANS, SCANS_FOLDER, accuracy, machine, table, timed
+from . import NO_SCANS, SCANS_FOLDER, accuracy, machine, parser_of, table, timed
 
 AZIMUTHS = (0.0, 60.0, 120.0)
 NOISE = 0.05  # The noise of a contact: the paper's fits are off their contacts by as much.
@@ -122,10 +120,8 @@ class Place(NamedTuple):
         return PAPER_WEIGHT * self.extent**2
 
     def contours(self, azimuths, seed, lean=0.0):
-        planes = [
-            core.SamplingPlane(np.radians(a + TURN * (seed % SEEDS)), np.radians(t))
-            for a, t in zip(azimuths, np.resize(lean * LEAN, len(azimuths)), strict=True)
-        ]
+        tilts = np.resize(lean * LEAN, len(azimuths))
+        planes = accuracy.sampling(azimuths, tilts, TURN * (seed % SEEDS))
         lengths = {"extent": self.extent, "step": self.extent / self.steps, "noise": NOISE}
         return core.track(self.surface, self.point, self.outward, planes, rng=seed, **lengths)
 
@@ -287,8 +283,7 @@ def _distances(row):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("zip", type=Path, help="the built extension")
+    parser = parser_of(__doc__, takes_zip=True)
     options = parser.parse_args()
     scanned = all((SCANS_FOLDER / scan.file).is_file() for scan in SCANS[:4])
     neck, *others = exact_places()

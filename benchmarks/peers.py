@@ -16,6 +16,8 @@ import numpy as np
 from core import reconstruct
 from core.patch.monge import exponents, monomials
 
+from .whole import cloud
+
 
 class Fit(NamedTuple):
     """A fitted surface in its own frame; kappas and height_std are None where the method has none.
@@ -43,21 +45,25 @@ def _scaled_fit(r, height):
     return Fit(r.frame.axes, lambda x, y: r.radius * height(np.column_stack([x, y]) / r.radius))
 
 
-def gaussian_process(case, nu=2.5):
-    """A process whose hyperparameters, with the noise, have the maximum likelihood.
-
-    nu : the order of the Matérn covariance; np.inf is the squared exponential
-    """
+def _process(points, values, length=1.0, nu=2.5, noisiest=0.1, **options):
+    """The process of values (n,) at points (n, 2) whose hyperparameters have the maximum likelihood."""
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
-    r, contacts, _ = _start(case)
-    kernel = ConstantKernel(1.0, (1e-4, 1e4)) * Matern(1.0, (0.05, 20.0), nu=nu)
-    process = GaussianProcessRegressor(kernel + WhiteKernel(1e-4, (1e-9, 0.1)), normalize_y=True)
+    kernel = ConstantKernel(1.0, (1e-4, 1e4)) * Matern(length, (0.05, 20.0), nu=nu)
+    process = GaussianProcessRegressor(kernel + WhiteKernel(1e-4, (1e-9, noisiest)), **options)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # It warns of hyperparameters at their bounds.
-        process.fit(contacts[:, :2], contacts[:, 2])
-    return _scaled_fit(r, process.predict)
+        return process.fit(points, values)
+
+
+def gaussian_process(case, nu=2.5):
+    """A process of the heights, with a noise of its own.
+
+    nu : the order of the Matérn covariance; np.inf is the squared exponential
+    """
+    r, contacts, _ = _start(case)
+    return _scaled_fit(r, _process(contacts[:, :2], contacts[:, 2], nu=nu, normalize_y=True).predict)
 
 
 def quadric_process(case):
@@ -73,19 +79,12 @@ def matern_on_quadric(contacts, noisiest=0.1):
 
     noisiest : the largest variance of the noise, as a multiple of that of the quadric's residuals
     """
-    from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
-
     terms = exponents(0, 2)
     basis = monomials(contacts, terms)
     b = np.linalg.lstsq(basis, contacts[:, 2], rcond=None)[0]
     left = contacts[:, 2] - basis @ b
     scale = max(left.std(), 1e-9)
-    kernel = ConstantKernel(1.0, (1e-4, 1e4)) * Matern(0.5, (0.05, 20.0), nu=2.5)
-    process = GaussianProcessRegressor(kernel + WhiteKernel(1e-4, (1e-9, noisiest)))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # It warns of hyperparameters at their bounds.
-        process.fit(contacts[:, :2], left / scale)
+    process = _process(contacts[:, :2], left / scale, 0.5, noisiest=noisiest)
 
     def height_std(points):
         noisy = process.predict(points, return_std=True)[1] ** 2 - process.kernel_.k2.noise_level
@@ -158,7 +157,6 @@ def screened_poisson(case, true_normals, neighbors=40):
     neighbors would all be of one curve, which does not determine a normal. A finer octree changes only the
     time. Heights are linear between the vertices of the upper side.
     """
-    import pymeshlab
     from scipy.interpolate import LinearNDInterpolator
 
     r, contacts, _ = _start(case)
@@ -166,8 +164,7 @@ def screened_poisson(case, true_normals, neighbors=40):
     offsets = np.vstack([contour.points for contour in case.contours]) - case.point
     given = normals[np.linalg.norm(offsets, axis=1) > 0.0]
     normals = np.vstack([case.axes[:, 2] @ r.frame.axes, given])  # The contacts have the same order.
-    meshes = pymeshlab.MeshSet(verbose=False)
-    meshes.add_mesh(pymeshlab.Mesh(vertex_matrix=contacts, v_normals_matrix=normals))
+    meshes = cloud(contacts, normals)
     if not true_normals:
         meshes.compute_normal_for_point_clouds(
             k=neighbors, flipflag=True, viewpos=np.array([0.0, 0.0, 100.0])

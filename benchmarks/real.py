@@ -16,24 +16,25 @@ to read the scans and to cast rays, and scikit-learn for the Gaussian process. I
 All methods are judged above the domain and along the normal of the paper's frame, from which the peers start.
 """
 
-import argparse
 import math
 from collections import defaultdict
 from functools import partial
 from statistics import median
-from time import process_time
 from typing import NamedTuple
 from unittest import mock
 
 import numpy as np
 
-from core import SamplingPlane, explore, reconstruct, track
+from core import explore, reconstruct, track
 from core.bayes import process_fit
 from core.patch.monge import exponents, monomials
+from core.triangles import normalized, triangle_cross
 from tools import blender
 
-from . import machine, scan_files, table
+from . import machine, parser_of, scan_files, table, timed
+from .accuracy import sampling
 from .peers import Fit, quadric_process, radial_basis
+from .whole import Rays
 
 PLANES, EXTENTS, STEPS = (3, 4, 5, 6), (32, 16, 8), 12
 # At most this many points of the mesh above a domain are compared, and at least this many.
@@ -45,12 +46,12 @@ OFF, TOO_FAR, SILENT, TURNED, ALIKE = 0.02, 3.0, 5.0, 10.0, 0.05
 DENSE = 150  # The number of points of the mesh to which the true frame is fitted.
 
 
-class Scan:
+class Scan(Rays):
     """A scan, centered and scaled to size 1, that casts rays by Blender's tree of its faces."""
 
+    @blender.quiet()
     def __init__(self, path):
         import bpy
-        from mathutils.bvhtree import BVHTree
 
         bpy.ops.wm.read_homefile(use_empty=True)
         (bpy.ops.wm.ply_import if path.suffix == ".ply" else bpy.ops.wm.stl_import)(filepath=str(path))
@@ -61,16 +62,10 @@ class Scan:
         mesh.vertices.foreach_get("co", points.ravel())
         mesh.loop_triangles.foreach_get("vertices", faces.ravel())
         points = (points - points.mean(axis=0)) / np.ptp(points, axis=0).max()
-        a, b, c = (points[faces[:, i]] for i in range(3))
-        across = np.cross(b - a, c - a)
-        self.name, self.areas, self.centers = path.stem, np.linalg.norm(across, axis=1), (a + b + c) / 3.0
-        self.normals = across / np.maximum(self.areas, 1e-300)[:, None]
-        self.points, self.faces = points, faces
-        self.tree = BVHTree.FromPolygons(points.tolist(), faces.tolist(), all_triangles=True)
-
-    def ray_cast(self, origin, direction, distance):
-        hit, normal, _, _ = self.tree.ray_cast(origin, direction, distance)
-        return None if hit is None else (tuple(hit), tuple(normal))
+        across, self.centers = triangle_cross(points[faces]), points[faces].mean(axis=1)
+        self.areas, self.normals = np.linalg.norm(across, axis=1), normalized(across)
+        self.name, self.points, self.faces = path.stem, points, faces
+        super().__init__(points, faces)
 
     def places(self, count, seed):
         """Pairs of a random point (3,) and the normal (3,) there, random by area."""
@@ -151,10 +146,10 @@ def touches(scan, count):
     for point, normal in scan.places(count, 0):
         for extent in EXTENTS:
             for planes in PLANES:
-                azimuths = [SamplingPlane(math.pi * i / planes) for i in range(planes)]
                 lengths = {"extent": 1.0 / extent, "step": 1.0 / extent / STEPS}
                 try:
-                    contours = track(scan, point, normal, azimuths, **lengths)
+                    cuts = sampling(180.0 / planes * np.arange(planes))
+                    contours = track(scan, point, normal, cuts, **lengths)
                     paper = {"outward": normal, "method": "least-squares", "degree": 2}
                     r = reconstruct(point, contours, **paper)
                 except ValueError:  # There is an edge or a hole.
@@ -198,10 +193,9 @@ def fixed_scores(scan, count, methods):
     scores, seconds = defaultdict(lambda: defaultdict(list)), defaultdict(list)
     for cell, touch, radius in touches(scan, count):
         for name, method in methods.items():
-            start = process_time()
-            fit = method(touch)
-            fit.height(*np.resize(touch.hold_out @ fit.axes, (300, 3))[:, :2].T)
-            seconds[name, cell[0]].append(process_time() - start)
+            spent, fit = timed(method, touch)
+            flat = np.resize(touch.hold_out @ fit.axes, (300, 3))[:, :2]
+            seconds[name, cell[0]].append(spent + timed(fit.height, *flat.T)[0])
             scores[cell][name].append(score(fit, touch, radius))
     means = {c: {m: Score(*np.mean(s, axis=0)) for m, s in of.items()} for c, of in scores.items()}
     return means, seconds
@@ -248,16 +242,15 @@ def time_table(scores, seconds):
 
 def automatic_row(scan, count):
     """The numbers of a row of (c)."""
-    planes = [SamplingPlane(math.pi * i / 3) for i in range(3)]
     sure, doubtful, refused, seconds = [], [], 0, []
     for point, normal in scan.places(count, 1):
-        start = process_time()
         try:
-            r = explore(scan, point, normal, planes, farthest=0.5, degree="auto").result
+            spent, found = timed(explore, scan, point, normal, sampling(), farthest=0.5, degree="auto")
         except ValueError:
             refused += 1
             continue
-        seconds.append(process_time() - start)
+        r = found.result
+        seconds.append(spent)
         (sure if r.status == "ok" else doubtful).append((r, _off(scan, r)))
     is_right = [
         off > OFF * r.radius or off > TOO_FAR * r.mean_height_std or _turned(scan, r) for r, off in doubtful
@@ -299,13 +292,9 @@ def _turned(scan, r):
 
 
 def automatic_table(rows):
-    print(
-        "(c) Automatic touches. A doubt is right where the heights are off by over 2 % of the radius or three"
-    )
-    print(
-        "deviations, or the frame by 10 degrees where curvatures differ. Areas are in ‰ of the size "
-        "squared, the radius in ‰ of the size, times in ms of the processor.\n"
-    )
+    print("(c) Automatic touches. A doubt is right where the heights are off by over 2 % of the radius or")
+    print("three deviations, or the frame by 10 degrees where curvatures differ. Areas are in ‰ of the size")
+    print("squared, the radius in ‰ of the size, times in ms of the processor.\n")
     head = "scan|sure|in doubt|refused|justified warnings|sure, off > 2 %|> 5 deviations|turned"
     head += "|all areas|radius|ms"
     total = [sum(row[i] for row in rows.values()) for i in range(8)]
@@ -314,14 +303,12 @@ def automatic_table(rows):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__)
     parser.add_argument("--points", type=int, default=100, help="of each scan (%(default)s)")
     parser.add_argument("--only", choices=("fixed", "automatic"), help="only this part")
     parser.add_argument("--scan", default="", help="only scans with this in their names")
     options = parser.parse_args()
-    paths = scan_files(options.scan)
-    with blender.quiet():
-        scans = [Scan(path) for path in paths]
+    scans = [Scan(path) for path in scan_files(options.scan)]
     if options.only != "automatic":
         scores, seconds = {}, defaultdict(list)
         for scan in scans:

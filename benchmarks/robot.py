@@ -18,7 +18,6 @@ The last table compares moving centers along the force with `ball=3.15`, which m
 the fit to the centers. The held-out centers judge both: they should be 3.15 mm away from the surface.
 """
 
-import argparse
 import math
 import sys
 import warnings
@@ -32,7 +31,7 @@ import numpy as np
 from core import Contour, distances, reconstruct
 from core.reconstruction.strokes import means
 
-from . import machine, table, timed
+from . import machine, parser_of, table, timed
 from .peers import matern_on_quadric
 
 BALL, LEAST_FORCE = 3.15, 0.1  # mm, N
@@ -242,7 +241,7 @@ def row(name, scores):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__)
     parser.add_argument("folder", help="the folder of the data")
     parser.add_argument("--points", type=int, default=20, help="of each exploration (%(default)s)")
     parser.add_argument("--radius", type=float, default=8.0, help="of a patch, in mm (%(default)s)")

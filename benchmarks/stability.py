@@ -19,7 +19,6 @@ The first table is about what no contact can show, whatever the method, and abou
 turned: how often a warning was due, and how often "bayes" gave one.
 """
 
-import argparse
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
@@ -29,11 +28,12 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from core import METHODS, Contour, SamplingPlane, reconstruct, track
+from core import METHODS, Contour, reconstruct, track
 from tests import surfaces
 
-from . import machine, plot
-from .accuracy import SURFACES, TURN, above, darboux, table
+from . import machine, parser_of, plot, table
+from .accuracy import SURFACES, TURN, above, darboux, sampling
+from .whole import Rays
 
 SEEDS = 3
 TOO_FAR, TURNED, UMBILIC, SMALL = 3.0, 10.0, 0.05, 0.01  # The numbers of the rule.
@@ -90,15 +90,11 @@ def touch(surface, extent, setting, seed):
     """(point, outward, contours). Raises ValueError where the touch is refused."""
     rng = np.random.default_rng(seed)
     axes, _ = darboux(surface)
-    planes = [
-        SamplingPlane(np.radians(a + setting.turn), np.radians(t))
-        for a, t in zip(setting.azimuths, setting.tilts, strict=True)
-    ]
     contours = track(
         setting.wrap(surface, axes, extent) if setting.wrap else surface,
         surface.point,
         axes[:, 2],
-        planes,
+        sampling(setting.azimuths, setting.tilts, setting.turn),
         extent=extent,
         step=setting.step * extent,
         noise=NOISE if setting.noise is None else setting.noise * extent,
@@ -208,12 +204,10 @@ def late(distance, outward, curves, point, extent, rng):
     return found
 
 
-class Facets:
+class Facets(Rays):
     """A surface as triangles with edges of about `size`, which cast rays by Blender's tree."""
 
     def __init__(self, size, surface, axes, extent):
-        import bpy  # noqa: F401  # It brings mathutils.
-        from mathutils.bvhtree import BVHTree
         from scipy.spatial import Delaunay
 
         count = int(np.ceil(1.5 * extent / size)) + 1
@@ -223,11 +217,7 @@ class Facets:
         there = surface.point + above(surface, axes, np.array(darboux(surface)[1]), flat)
         exists = np.isfinite(there).all(axis=1)
         faces = Delaunay(flat[exists]).simplices
-        self.tree = BVHTree.FromPolygons(there[exists].tolist(), faces.tolist(), all_triangles=True)
-
-    def ray_cast(self, origin, direction, distance):
-        hit, normal, _, _ = self.tree.ray_cast(origin, direction, distance)
-        return None if hit is None else (tuple(hit), tuple(normal))
+        super().__init__(there[exists], faces)
 
 
 def facets(share, surface, axes, extent):
@@ -400,13 +390,9 @@ def _harmless(of):
 
 
 def rule_table(results):
-    print(
-        "For each method the cases where a warning or a refusal is due (all refusals count) and those where"
-    )
-    print(
-        "it was not given; the harmless cases, and the share of them that were warned of; and the median of"
-    )
-    print("mean height_std over mean |dz|.\n")
+    print("For each method the cases where a warning or a refusal is due (all refusals count) and those")
+    print("where it was not given; the harmless cases, and the share of them that were warned of; and the")
+    print("median of mean height_std over mean |dz|.\n")
     rows = []
     for method in METHODS:
         of = [(key, found[method]) for key, found in results.items()]
@@ -435,13 +421,19 @@ def rule_table(results):
     print()
 
 
+def of_value(results, number, value, method):
+    """Outcomes of a method at a value of a sweep, and medians of error, std and condition of those made."""
+    of = [found[method] for key, found in results.items() if (key.sweep, key.value) == (number, value)]
+    made = [f for f in of if f.status != "refused"] or [Outcome("refused")]
+    return of, [np.median([getattr(f, what) for f in made]) for what in ("error", "std", "condition")]
+
+
 def untold_table(results):
     print("What no contact can tell, and normals that contradict contacts: bayes, medians in % of L.\n")
     rows = []
     for number, sweep in enumerate(UNTOLD, len(SWEEPS)):
         for value in sweep.values:
-            of = [f["bayes"] for key, f in results.items() if (key.sweep, key.value) == (number, value)]
-            made = [f for f in of if f.status != "refused"] or [Outcome("refused")]
+            of, medians = of_value(results, number, value, "bayes")
             rows.append([
                 sweep.title,
                 f"{value:g}",
@@ -449,7 +441,7 @@ def untold_table(results):
                 f"{sum(f.is_due for f in of)}",
                 f"{sum(map(is_quiet, of))}",
                 f"{sum(f.status != 'ok' for f in of)}",
-                *(f"{100.0 * np.median([getattr(f, what) for f in made]):.2f}" for what in ("error", "std")),
+                *(f"{100.0 * median:.2f}" for median in medians[:2]),
             ])  # fmt: skip
     table(["change", "value", "cases", "needed", "needed but missing", "warned", "error", "stated"], rows)
 
@@ -463,19 +455,14 @@ def rows_of(results):
     rows = []
     for number, sweep in enumerate(SWEEPS):
         for value in sweep.values:
-            of = [found for key, found in results.items() if (key.sweep, key.value) == (number, value)]
             for method in METHODS:
-                found = [f[method] for f in of]
-                made = [f for f in found if f.status != "refused"] or [Outcome("refused")]
-                medians = [
-                    np.median([getattr(f, what) for f in made]) for what in ("error", "std", "condition")
-                ]
+                found, medians = of_value(results, number, value, method)
                 refused = np.mean([f.status == "refused" for f in found])
                 warned = np.mean([f.status not in ("ok", "refused") for f in found])
                 shares = [round(share, 3) for share in (warned, refused)]
                 quiet = sum(map(is_quiet, found))
                 rows.append(
-                    [sweep.title, value, method, len(of), *(f"{m:.3g}" for m in medians), *shares, quiet]
+                    [sweep.title, value, method, len(found), *(f"{m:.3g}" for m in medians), *shares, quiet]
                 )
     return rows
 
@@ -552,7 +539,7 @@ def panel(axes, sweep, of, first):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__)
     parser.add_argument("--seeds", type=int, default=SEEDS, help="of the noise (%(default)s)")
     options = parser.parse_args()
     keys = [

@@ -13,9 +13,9 @@ NOISE = 0.0005
 EDGE = 0.008  # The length of an edge of the mesh; those of Poisson at depth 8 are half as long.
 
 
-def touched_all_over(thing, point, normal, tolerance, **options):
-    """(atlas, explorations, number of touches made) of core.touch_all_over, from a point of an object on."""
-    steps = core.touch_all_over(thing, point, normal, tolerance=tolerance, noise=NOISE, **options)
+def touched_all_over(thing, start, tolerance, **options):
+    """(atlas, explorations, number of touches made) of core.touch_all_over, from (point, normal) on."""
+    steps = core.touch_all_over(thing, *start, tolerance=tolerance, noise=NOISE, **options)
     found, done = [], 0
     try:
         while True:
@@ -51,6 +51,17 @@ def tree_of(vertices, triangles):
     return BVHTree.FromPolygons(
         np.asarray(vertices).tolist(), np.asarray(triangles).tolist(), all_triangles=True
     )
+
+
+class Rays:
+    """A mesh that answers rays."""
+
+    def __init__(self, vertices, triangles):
+        self.tree = tree_of(vertices, triangles)
+
+    def ray_cast(self, origin, direction, distance):
+        hit, normal, _, _ = self.tree.ray_cast(origin, direction, distance)
+        return None if hit is None else (tuple(hit), tuple(normal))
 
 
 def away(tree, points):

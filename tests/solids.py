@@ -84,6 +84,28 @@ def rounded(radius, a=1.0, b=0.7, c=0.5):
     return Solid(lambda x, y, z: inner.distance(x, y, z) - radius, (0.05, 0.03, c), (0.0, 0.0, 1.0))
 
 
+def slotted(width=0.1, depth=0.4):
+    """A block with a slot along y."""
+    whole = block()
+
+    def distance(x, y, z):
+        return max(whole.distance(x, y, z), -max(abs(x - 0.4) - width / 2.0, whole.walls[4][1] - depth - z))
+
+    return Solid(distance, whole.start, whole.outward)
+
+
+def pinned(radius=0.04, length=0.8):
+    """A block with a pin that stands on it."""
+    low = block(0.5, 0.5, 0.3)
+
+    def distance(x, y, z):
+        aside, along = math.hypot(x - 0.2, y - 0.1) - radius, abs(z - 0.3) - length
+        pin = math.hypot(max(aside, 0.0), max(along, 0.0)) + min(max(aside, along), 0.0)
+        return min(low.distance(x, y, z), pin)
+
+    return Solid(distance, (-0.2, -0.1, 0.3), (0.0, 0.0, 1.0))
+
+
 def prism(sides, radius=1.0, half=0.6):
     """A regular prism around z; its distance is that of the planes of its walls."""
     turns = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides

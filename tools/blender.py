@@ -42,6 +42,7 @@ def quiet():
         os.close(output)
 
 
+@quiet()
 def start(extension):
     """Installs and enables the zip `extension` in Blender and returns the extension's module."""
     import bpy

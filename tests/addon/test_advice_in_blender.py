@@ -102,3 +102,28 @@ def test_a_shorter_edge_length_helps(empty, code, edge):
     assert "use a shorter edge length" in record["message"]
     assert empty.ops.tactile.mesh_again(edge=0.1) == {"FINISHED"}
     assert empty.context.object["tactile_object"]["status"] == "ok"
+
+
+@pytest.mark.long
+def test_a_shorter_edge_length_helps_against_holes(empty):
+    empty.ops.mesh.primitive_cylinder_add(vertices=64, end_fill_type="NOTHING")
+    empty.ops.tactile.touch_all_over(tolerance=0.02, edge=0.2)
+    record = empty.context.object["tactile_object"]
+    assert [doubt["code"] for doubt in record["doubts"]] == ["holes"]
+    assert empty.ops.tactile.mesh_again(edge=0.1) == {"FINISHED"}
+    assert empty.context.object["tactile_object"]["status"] == "ok"
+
+
+@pytest.mark.long
+def test_a_smaller_tolerance_reaches_into_a_slot(empty):
+    profile = [(-1, -5), (1, -5), (1, 5), (0.45, 5), (0.45, 1), (0.35, 1), (0.35, 5), (-1, 5)]
+    mesh = empty.data.meshes.new("Slotted")
+    mesh.from_pydata([(x, 0.0, 0.1 * z) for x, z in profile], [], [range(len(profile))])
+    slotted = empty.data.objects.new("Slotted", mesh)
+    slotted.modifiers.new("Solidify", "SOLIDIFY").thickness = 1.4
+    empty.context.collection.objects.link(slotted)
+    empty.ops.tactile.touch_all_over(target=slotted.name, tolerance=0.05)
+    record = empty.context.object["tactile_object"]
+    assert "out_of_reach" in [doubt["code"] for doubt in record["doubts"]]
+    assert empty.ops.tactile.continue_touching(tolerance=0.02) == {"FINISHED"}
+    assert empty.context.object["tactile_object"]["status"] == "ok"
