@@ -49,14 +49,14 @@ class _Sidebar(PanelMixin):
 
 
 class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
-    bl_idname = "TACTILE_PT_probe"
     bl_label = "Tactile Probe"
 
     def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
         if context.mode != "OBJECT":
             draw_sentence(context, layout, OTHER_MODE, "INFO")
-            leave = layout.operator("object.mode_set", text="Go to Object Mode", icon="OBJECT_DATAMODE")
-            leave.mode = "OBJECT"
+            layout.operator(
+                "object.mode_set", text="Go to Object Mode", icon="OBJECT_DATAMODE"
+            ).mode = "OBJECT"
         found = probe.probe_of(obj)
         if found is None:
             _draw_pick(context, layout, obj)
@@ -117,7 +117,6 @@ def _draw_planes(context: bpy.types.Context, layout: bpy.types.UILayout, setting
 
 
 class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
-    bl_idname = "TACTILE_PT_result"
     bl_label = "Patch"
 
     @classmethod
@@ -139,8 +138,8 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         unit = units.unit_of_report(context.scene, record)
         is_outdated = record["status"] == "outdated"
         if not (is_outdated and failed):  # The failure stands above already.
-            icon = ICONS.get(record["status"], "ERROR")
-            draw_sentence(context, layout, verdict(record, unit), icon, lines=VERDICT_LINES)
+            words, icon = verdict(record, unit), ICONS.get(record["status"], "ERROR")
+            draw_sentence(context, layout, words, icon, lines=VERDICT_LINES)
         if found is not None:
             _draw_remedy(layout, record)
         draw_rows(context, layout, main_rows(record, unit), active=not is_outdated)
@@ -161,7 +160,6 @@ def _draw_remedy(layout: bpy.types.UILayout, record: Mapping[str, Any]) -> None:
 
 
 class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
-    bl_idname = "TACTILE_PT_object"
     bl_label = "Whole Object"
 
     def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
@@ -170,8 +168,7 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         if obj is None or patch_record.ATLAS_RECORD not in obj:
             return
         record = obj[patch_record.ATLAS_RECORD]
-        good = "CHECKMARK" if is_all_within(record) else "INFO"
-        icon = good if record["status"] == "ok" else "ERROR"
+        icon = "CHECKMARK" if is_all_within(record) else "INFO" if record["status"] == "ok" else "ERROR"
         draw_sentence(context, layout, object_verdict(record), icon)
         if words := facets(record):
             draw_sentence(context, layout, words, "INFO")
@@ -191,7 +188,6 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
 
 
 class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
-    bl_idname = "TACTILE_PT_map"
     bl_label = "Stability Map"
 
     def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
@@ -212,7 +208,6 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
 
 
 class TACTILE_PT_probes(_Sidebar, bpy.types.Panel):
-    bl_idname = "TACTILE_PT_probes"
     bl_label = "Probes"
     bl_options = {"DEFAULT_CLOSED"}
 
@@ -226,8 +221,9 @@ class TACTILE_PT_probes(_Sidebar, bpy.types.Panel):
             if record is not None:
                 words = curvatures(record, units.unit_of_report(context.scene, record))
             text, is_active = f"{found.name}   {words}", found == probe.probe_of(obj)
-            go = column.operator("tactile.activate", text=text, icon=icon, depress=is_active, translate=False)
-            go.name = found.name
+            column.operator(
+                "tactile.activate", text=text, icon=icon, depress=is_active, translate=False
+            ).name = found.name
         row = layout.row(align=True)
         row.operator("tactile.export_table", text="Table", icon="EXPORT")
         row.operator("tactile.export_report", text="Report", icon="FILE_TEXT")
@@ -263,8 +259,8 @@ def _draw_range(context: bpy.types.Context, layout: bpy.types.UILayout, patch: O
     row = layout.row()
     row.use_property_split = False
     name = iface("Range" if patch_record.RANGE in patch else "Range (Auto)")
-    symbol = units.symbol(*unit_of_range(patch, context.scene))
-    row.prop(patch, "tactile_range", text=f"{name} {symbol}".rstrip(), translate=False)
+    words = f"{name} {units.symbol(*unit_of_range(patch, context.scene))}"
+    row.prop(patch, "tactile_range", text=words.rstrip(), translate=False)
 
 
 def _draw_shown(layout: bpy.types.UILayout, found: Object | None, patch: Object) -> None:
@@ -292,9 +288,8 @@ def _draw_comparison(
     layout = layout.column()
     layout.active = record["status"] != "outdated"
     layout.label(text=record["verification"]["target"], icon="MESH_DATA", translate=False)
-    table = [(label, " | ".join(values)) for label, *values in verification_table(record, unit)]
-    draw_rows(context, layout, table)
-    draw_rows(context, layout, verification_rows(record, unit))
+    for rows in (verification_table(record, unit), verification_rows(record, unit)):
+        draw_rows(context, layout, [(label, " | ".join(values)) for label, *values in rows])
 
 
 PANELS = (TACTILE_PT_probe, TACTILE_PT_result, TACTILE_PT_object, TACTILE_PT_map, TACTILE_PT_probes)

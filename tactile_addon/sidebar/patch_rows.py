@@ -31,14 +31,14 @@ def other_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
         *_radii(record, unit),
         ("K Gaussian", measured(record, "gaussian_curvature", -2, unit)),
         ("H Mean", measured(record, "mean_curvature", -1, unit)),
-        ("Shape Index", _shape_index(record)),
+        ("Shape Index", "–" if is_flat(record) else f"{record['shape_index']:.2f}"),
         ("Curvedness", said(record, "curvedness", -1, unit)),
         ("Fit Error", said(record, "fit_error", 1, unit)),
     ]
     if record["is_verified"] and record["vertices"]:
         rows.append(("Farthest", said(record, "vertex_distance_max", 1, unit)))
-    lengths = ("extent", "step") if "step" in record else ("radius",)
-    rows += [(key.title(), units.say(record[key], 1, unit)) for key in lengths]
+    for key in ("extent", "step") if "step" in record else ("radius",):
+        rows.append((key.title(), units.say(record[key], 1, unit)))
     return [*rows, ("Degree", str(record["degree"])), ("Contacts", str(record["contacts"]))]
 
 
@@ -58,13 +58,11 @@ def found_values(record: Mapping[str, Any] | None, scene: bpy.types.Scene) -> di
     if record is None or record["status"] == "outdated" or "step" not in record:
         return {}
     unit = units.unit_of_report(scene, record)
-    lengths = {name: units.say(record[name], 1, unit) for name in ("extent", "step")}
-    return lengths | {"degree": str(record["degree"])}
-
-
-def _shape_index(record: Mapping[str, Any]) -> str:
-    """The shape index in words; a flat patch has none."""
-    return "–" if is_flat(record) else f"{record['shape_index']:.2f}"
+    return {
+        "extent": units.say(record["extent"], 1, unit),
+        "step": units.say(record["step"], 1, unit),
+        "degree": str(record["degree"]),
+    }
 
 
 def _radii(record: Mapping[str, Any], unit: Unit) -> Iterator[tuple[str, str]]:

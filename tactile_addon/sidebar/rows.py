@@ -119,8 +119,7 @@ def draw_sentence(
     """Draws a sentence in as many lines as the sidebar's width needs, or in just as many as given."""
     column = layout.column(align=True)
     column.scale_y = 0.8
-    width = max(16, int(_letters(context)))
-    found = textwrap.wrap(sentence, width, max_lines=lines, placeholder=" …")
+    found = textwrap.wrap(sentence, max(16, int(_letters(context))), max_lines=lines, placeholder=" …")
     for i, line in enumerate([*found, *[""] * ((lines or 0) - len(found))]):
         column.label(text=line, icon=icon if i == 0 else "BLANK1")
 
