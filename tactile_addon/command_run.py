@@ -140,8 +140,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     if patch_record.GRAPH in made:
         report["graph"] = json.loads(made[patch_record.GRAPH])
     if options.contacts is not None:
-        r = patch_record.reconstruction_of(made)
-        contact_file.write(options.contacts, contact_file.contacts_of(r))
+        contact_file.write(options.contacts, contact_file.contacts_of(patch_record.reconstruction_of(made)))
     if options.report is not None:
         pages.write(options.report, made)
     if options.output is not None:
@@ -203,8 +202,7 @@ def _open_contacts(options: argparse.Namespace) -> dict[str, Any]:
     """The files as arguments. If no .blend is open, an empty scene gets their unit, so that numbers stay."""
     if not bpy.data.filepath:
         bpy.ops.wm.read_homefile(use_empty=True)
-        unit = measured.read(options.files, options.unit or "FILE", 1.0, options.command == "join").unit
-        _set_unit(unit)
+        _set_unit(measured.read(options.files, options.unit or "FILE", 1.0, options.command == "join").unit)
     paths = [path.absolute() for path in options.files]
     if len({path.parent for path in paths}) > 1:
         raise Misuse("FILE: expected files from one folder")

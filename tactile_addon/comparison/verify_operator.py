@@ -102,8 +102,7 @@ class Verification:
             mean = self._found.get("vertex_distance_mean", 0.0) if height is None else height
             # Another mesh, as a scan, may show only a part of the object.
             missing = self._error.missing if record["source"] == self.target else 0.0
-            error = core.MeshError(mean, missing)
-            record.update(judgment(r, error, record["ended"]))
+            record.update(judgment(r, core.MeshError(mean, missing), record["ended"]))
         return record.to_dict()
 
     def _objects(self) -> tuple[Object, Object]:

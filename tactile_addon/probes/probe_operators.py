@@ -214,8 +214,7 @@ class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
         target = found.tactile_probe.target
-        patch = probe.patch_of(found)
-        patch_object.remove_objects([obj for obj in (patch, found) if obj is not None])
+        patch_object.remove_objects([obj for obj in (probe.patch_of(found), found) if obj is not None])
         if target is not None:  # What comes next, as another pick, is about it.
             make_active(context, target)
         return {"FINISHED"}

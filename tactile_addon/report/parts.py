@@ -135,8 +135,7 @@ def three_sides(mesh: bpy.types.Mesh, colors: Array) -> Iterator[str]:
         # Shading shows the shape where colors are pale. What is nearer is drawn later.
         light = DARKEST + (1.0 - DARKEST) * np.abs(normals[:, sight, None])
         order = np.argsort(sign * points[corners, sight].mean(axis=1))
-        picture = page.triangles(points[:, axes], corners[order], (light * found)[order])
-        yield page.figure(picture, words)
+        yield page.figure(page.triangles(points[:, axes], corners[order], (light * found)[order]), words)
 
 
 def _coarse(mesh: bpy.types.Mesh, colors: Array) -> tuple[Array, Array, Array]:

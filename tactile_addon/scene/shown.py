@@ -127,8 +127,7 @@ def unit_of_range(obj: Object, scene: bpy.types.Scene) -> tuple[int, units.Unit]
 
 def _get(obj: Object) -> float:
     power, unit = unit_of_range(obj, bpy.context.scene)
-    limit = obj.get(RANGE) or (_record(obj) or {}).get("color_limit", 0.0)
-    return limit / unit[1] ** power
+    return (obj.get(RANGE) or (_record(obj) or {}).get("color_limit", 0.0)) / unit[1] ** power
 
 
 def _set(obj: Object, value: float) -> None:

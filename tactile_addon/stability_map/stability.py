@@ -140,8 +140,7 @@ class StabilityMap:
         count = len(self.places)
         self.measures = np.full(count, NOTHING, dtype=[(name, float) for name in MEASURES])
         self.reason = np.full(count, REASON_KEYS.index("nothing"), dtype=np.int32)
-        batch = BATCH if self.extent else GROWING_BATCH
-        size = batch if self.fit["method"] == "bayes" else 1
+        size = (BATCH if self.extent else GROWING_BATCH) if self.fit["method"] == "bayes" else 1
         self.began = perf_counter()
         for start in range(0, count, size):
             end = min(start + size, count)
@@ -203,8 +202,7 @@ class StabilityMap:
     def _note(self, number: int, touch: core.Exploration) -> None:
         result = core.with_facets(touch.result, self.surface.face_near, self.surface.corners_of)
         self.few_facets += result.gravest is not None and result.gravest.code == "facets"
-        is_sure = result.gravest is None
-        self.reason[number] = REASON_KEYS.index("patch" if is_sure else "doubt")
+        self.reason[number] = REASON_KEYS.index("patch" if result.gravest is None else "doubt")
         self.measures[number] = (
             NOTHING if result.taps.height is None else result.taps.height,
             result.mean_height_std,

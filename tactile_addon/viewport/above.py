@@ -89,8 +89,7 @@ def _new_batch(mesh: bpy.types.Mesh, points: Array, colors: Array, height: float
     mesh.calc_loop_triangles()
     loops = read_array(mesh.loop_triangles, "loops", 3, dtype=np.int32).ravel()
     corners = read_array(mesh.loop_triangles, "vertices", 3, dtype=np.int32).ravel()
-    normals = read_array(mesh.vertices, "normal", 3)
-    points = points + height * normals
+    points = points + height * read_array(mesh.vertices, "normal", 3)
     facing = read_array(mesh.corner_normals, "vector", 3)
     columns: dict[str, Any] = {"pos": points[corners], "normal": facing[loops], "color": colors[loops]}
     return batch_for_shader(_shader(), "TRIS", columns)

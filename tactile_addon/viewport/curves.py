@@ -79,8 +79,7 @@ def draw(curves: Curves, rim: tuple[float, ...], has_contours: bool, has_directi
     _draw_lines([(np.asarray(path, dtype=float).tobytes(), color) for path, color in lines])
     gpu.state.point_size_set(STROKE * scale)
     for path in curves.get("strokes", ()) if has_contours else ():
-        points = np.reshape(path, (-1, 3)).tolist()
-        draw_shape("POINTS", "POINT_UNIFORM_COLOR", {"pos": points}, color=BLACK)
+        draw_shape("POINTS", "POINT_UNIFORM_COLOR", {"pos": np.reshape(path, (-1, 3)).tolist()}, color=BLACK)
 
 
 def _draw_lines(lines: Sequence[tuple[bytes, tuple[float, ...]]]) -> None:
@@ -104,8 +103,7 @@ def _batch(lines: tuple[tuple[bytes, tuple[float, ...]], ...], is_outline: bool)
     """The segments of lines, in their colors or dark."""
     pieces = [np.repeat(np.frombuffer(raw).reshape(-1, 3), 2, axis=0)[1:-1] for raw, _ in lines]
     shades = np.repeat([DARK if is_outline else color for _, color in lines], list(map(len, pieces)), axis=0)
-    columns = {"pos": np.vstack(pieces).tolist(), "color": shades.tolist()}
-    return batch_for_shader(_shader(), "LINES", columns)
+    return batch_for_shader(_shader(), "LINES", {"pos": np.vstack(pieces).tolist(), "color": shades.tolist()})
 
 
 def draw_shape(kind: Any, shader_name: str, columns: dict[str, Any], **uniform: Any) -> None:

@@ -222,5 +222,4 @@ PICK_DRAWINGS = ((draw_preview, "POST_VIEW"), (draw_key, "POST_PIXEL"))
 
 def add_drawings(drawings: Iterable[tuple[Callable[..., None], str]], *given: Any) -> list[Any]:
     """Adds drawings to all 3D viewports, and returns the handles by which to remove them."""
-    add = bpy.types.SpaceView3D.draw_handler_add
-    return [add(draw, given, "WINDOW", kind) for draw, kind in drawings]
+    return [bpy.types.SpaceView3D.draw_handler_add(draw, given, "WINDOW", kind) for draw, kind in drawings]

@@ -244,5 +244,4 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
         for warning in self._expected.warnings if self._expected else ():
             layout.label(text=warning, icon="ERROR")
         if self._expected is not None and self._expected.is_faceted:
-            button = layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
-            button.target = self.target
+            layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF").target = self.target

@@ -68,8 +68,7 @@ class TACTILE_OT_look_farthest(bpy.types.Operator):
 
 def _select_nearest(mesh: bpy.types.Mesh, place: Point) -> Any:
     """Selects the vertex nearest to a place, and nothing else, and returns it."""
-    offsets = read_array(mesh.vertices, "co", 3) - np.array(place)
-    nearest = int(np.argmin((offsets**2).sum(axis=1)))
+    nearest = int(np.argmin(((read_array(mesh.vertices, "co", 3) - np.array(place)) ** 2).sum(axis=1)))
     for parts in (mesh.vertices, mesh.edges, mesh.polygons):
         parts.foreach_set("select", np.zeros(len(parts), dtype=bool))
     mesh.vertices[nearest].select = True

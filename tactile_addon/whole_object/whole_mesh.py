@@ -73,8 +73,7 @@ class GrowingPatches:
             layer *= 1.0 + LAYERS * (GOLDEN_SECTION * len(self._patches) % 1.0)
             above = _below(self._surface, points, normals) + layer
             self._patches.append((points + above[:, None] * normals, mean_curvature))
-            certain = max(abs(r.k1) - r.k1_std, abs(r.k2) - r.k2_std, 0.0)
-            self._bends.append((certain, np.mean(rim**2)))
+            self._bends.append((max(abs(r.k1) - r.k1_std, abs(r.k2) - r.k2_std, 0.0), np.mean(rim**2)))
         points, mean_curvatures = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
         count = 1 + SPOKES * len(RINGS)
         triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
