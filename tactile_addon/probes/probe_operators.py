@@ -10,7 +10,6 @@ import bpy
 from bpy.props import IntProperty, StringProperty
 
 from ..scene import patch_object, patch_record
-from ..touch import units
 from ..touch.settings import MOST_PLANES, TARGET, length_property, silent
 from ..touch.types import Object, OperatorMixin, Outcome
 from ..touch.wording import added_planes
@@ -99,8 +98,7 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
             for plane in touched.report["added_planes"]:
                 _add(settings, plane)
             touch_again.adopt(found, touched, depsgraph, complete=True)
-        unit = units.unit_of_report(context.scene, touched.report)
-        return report_done(self, added_planes(touched.report, unit))
+        return report_done(self, added_planes(touched.report))
 
     def draw(self, context: bpy.types.Context) -> None:
         self.layout.use_property_split = True

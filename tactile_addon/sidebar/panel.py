@@ -21,7 +21,6 @@ from ..touch import units
 from ..touch.settings import draw_chosen, draw_fit, draw_noise
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object, PanelMixin
-from ..touch.units import Unit
 from ..touch.wording import curvatures, reasons, registration_summary, verdict
 from ..whole_object.object_report import deviation, facets, is_all_within, object_rows, object_verdict
 from .dots import dot
@@ -69,7 +68,7 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         row.operator("tactile.delete", text="", icon="TRASH")
         settings, record = found.tactile_probe, probe.record_of(found)
         layout.prop(settings, "target")
-        chosen = found_values(record, context.scene)
+        chosen = found_values(record)
         draw_chosen(layout, settings, "extent", chosen)
         _draw_planes(context, layout, settings)
         row = layout.row()
@@ -135,20 +134,19 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         if record is None:
             layout.label(text="This patch was edited: touch again", icon="ERROR")
             return
-        unit = units.unit_of_report(context.scene, record)
         is_outdated = record["status"] == "outdated"
         if not (is_outdated and failed):  # The failure stands above already.
-            words, icon = verdict(record, unit), ICONS.get(record["status"], "ERROR")
+            words, icon = verdict(record), ICONS.get(record["status"], "ERROR")
             draw_sentence(context, layout, words, icon, lines=VERDICT_LINES)
         if found is not None:
             _draw_remedy(layout, record)
-        draw_rows(context, layout, main_rows(record, unit), active=not is_outdated)
+        draw_rows(context, layout, main_rows(record), active=not is_outdated)
         _draw_colors(context, layout, patch, "tactile_colors")
         _draw_shown(layout, found, patch)
         if body := _folded(layout, "more", "More"):
-            _draw_more(context, body, patch, record, unit)
+            _draw_more(context, body, patch, record)
         if found is None or "verification" in record or "registration" in record:
-            _draw_comparison(context, layout, patch, record, unit)
+            _draw_comparison(context, layout, patch, record)
 
 
 def _draw_remedy(layout: bpy.types.UILayout, record: Mapping[str, Any]) -> None:
@@ -197,14 +195,13 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
             return
         layout.operator("tactile.pick", text="Probe on the Map", icon="EYEDROPPER").new = True
         record = obj[patch_record.MAP_RECORD]
-        unit = units.unit_of_report(context.scene, record)
         if words := map_facets(record):
             draw_sentence(context, layout, words, "ERROR")
-        draw_rows(context, layout, map_rows(record, unit))
+        draw_rows(context, layout, map_rows(record))
         _draw_colors(context, layout, obj, "tactile_map_colors")
         if record["patches"]:
             layout.label(text="Medians of the Patches")
-            draw_rows(context, layout, list(median_rows(record, unit)))
+            draw_rows(context, layout, list(median_rows(record)))
 
 
 class TACTILE_PT_probes(_Sidebar, bpy.types.Panel):
@@ -219,7 +216,7 @@ class TACTILE_PT_probes(_Sidebar, bpy.types.Panel):
             record, words = probe.record_of(found), found.tactile_probe.message
             icon: Any = "ERROR" if record is None else ICONS.get(record["status"], "ERROR")
             if record is not None:
-                words = curvatures(record, units.unit_of_report(context.scene, record))
+                words = curvatures(record)
             text, is_active = f"{found.name}   {words}", found == probe.probe_of(obj)
             column.operator(
                 "tactile.activate", text=text, icon=icon, depress=is_active, translate=False
@@ -230,14 +227,14 @@ class TACTILE_PT_probes(_Sidebar, bpy.types.Panel):
 
 
 def _draw_more(
-    context: bpy.types.Context, layout: bpy.types.UILayout, patch: Object, record: TouchReport, unit: Unit
+    context: bpy.types.Context, layout: bpy.types.UILayout, patch: Object, record: TouchReport
 ) -> None:
     """Draws what the fit says of itself, the range of the colors, and all other numbers."""
     is_current = record["status"] != "outdated"
     _draw_range(context, layout, patch)
     for i, words in enumerate(reasons(record)):
         draw_sentence(context, layout, words, "BLANK1" if i else ICONS.get(record["status"], "ERROR"))
-    for rows in (other_rows(record, unit), plane_rows(record, unit)):  # The labels of planes are long.
+    for rows in (other_rows(record), plane_rows(record)):  # The labels of planes are long.
         draw_rows(context, layout, rows, active=is_current)
     if probe.probe_of(patch) is not None:
         layout.operator("tactile.verify", icon="VIEWZOOM")
@@ -259,7 +256,7 @@ def _draw_range(context: bpy.types.Context, layout: bpy.types.UILayout, patch: O
     row = layout.row()
     row.use_property_split = False
     name = iface("Range" if patch_record.RANGE in patch else "Range (Auto)")
-    words = f"{name} {units.symbol(*unit_of_range(patch, context.scene))}"
+    words = f"{name} {units.symbol(*unit_of_range(patch))}"
     row.prop(patch, "tactile_range", text=words.rstrip(), translate=False)
 
 
@@ -274,7 +271,7 @@ def _draw_shown(layout: bpy.types.UILayout, found: Object | None, patch: Object)
 
 
 def _draw_comparison(
-    context: bpy.types.Context, layout: bpy.types.UILayout, patch: Object, record: TouchReport, unit: Unit
+    context: bpy.types.Context, layout: bpy.types.UILayout, patch: Object, record: TouchReport
 ) -> None:
     """Draws where the patch was put on a mesh, and how far it is off one, if these are known."""
     if probe.probe_of(patch) is None:
@@ -282,13 +279,13 @@ def _draw_comparison(
         layout.operator("tactile.register", icon="SNAP_ON")
         layout.operator("tactile.verify", icon="VIEWZOOM")
     if "registration" in record:
-        draw_sentence(context, layout, registration_summary(record["registration"], unit), "SNAP_ON")
+        draw_sentence(context, layout, registration_summary(record), "SNAP_ON")
     if "verification" not in record:
         return
     layout = layout.column()
     layout.active = record["status"] != "outdated"
     layout.label(text=record["verification"]["target"], icon="MESH_DATA", translate=False)
-    for rows in (verification_table(record, unit), verification_rows(record, unit)):
+    for rows in (verification_table(record), verification_rows(record)):
         draw_rows(context, layout, [(label, " | ".join(values)) for label, *values in rows])
 
 

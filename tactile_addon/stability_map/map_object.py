@@ -194,9 +194,8 @@ def inputs_of(painted: Object) -> dict[str, Any]:
 
 def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(label, value) of everything there is to say of a map."""
-    unit = units.unit_of_report(bpy.context.scene, record)
     names = ("spacing", "extent", "step")
-    lengths = [units.say(record[name], 1, unit) if record[name] else "auto" for name in names]
+    lengths = [units.say_of(record, record[name]) if record[name] else "auto" for name in names]
     return [
         (
             "touched",
@@ -206,7 +205,7 @@ def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("refused", ", ".join(_refused(record)) or "none"),
         ("fit", fit(record)),
         (", ".join(names), ", ".join(lengths)),
-        *((f"median {title.lower()}", value) for title, value in median_rows(record, unit)),
+        *((f"median {title.lower()}", value) for title, value in median_rows(record)),
     ]
 
 
@@ -224,12 +223,12 @@ def _refused(record: Mapping[str, Any]) -> list[str]:
     return [f"{count} {names[key]}" for key, count in record["refused"].items() if count]
 
 
-def map_rows(record: Mapping[str, Any], unit: units.Unit) -> list[tuple[str, str]]:
+def map_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(label, value) of how many patches a stability map has, and of the reasons why there are not more."""
     names, refused = {key: name for key, name, _ in REASONS}, [*record["refused"].items()]
     return [
         ("Points", _points(record)),
-        ("Spacing", units.say(record["spacing"], 1, unit)),
+        ("Spacing", units.say_of(record, record["spacing"])),
         ("Patches", str(record["patches"])),
         ("… in Doubt", str(record["in_doubt"])),
         *([("… on Facets", str(record["few_facets"]))] if record.get("few_facets") else []),
@@ -251,13 +250,13 @@ def facets(record: Mapping[str, Any]) -> str | None:
     return f"Curvature of the facets, not of the shape, at {many(count, 'point', 'points')}"
 
 
-def median_rows(record: Mapping[str, Any], unit: units.Unit) -> Iterator[tuple[str, str]]:
+def median_rows(record: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """(label, value) of the medians over the patches of a stability map that are known."""
     for name, title, _, power in MAP_QUANTITIES:
         if f"{name}_median" in record:
             found = record[f"{name}_median"]
             # In single precision a little is left of 0.
-            yield title, units.say(units.rounded(found, power, record["spacing"]), power, unit)
+            yield title, units.say_of(record, units.rounded(found, power, record["spacing"]), power)
 
 
 def _show(obj: Object, context: bpy.types.Context) -> None:

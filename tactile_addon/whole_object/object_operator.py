@@ -141,8 +141,8 @@ class Expected:
         if wall < THIN_SHARE:
             self.warnings.append(f"Walls of {100.0 * wall:.2g} % of its size may be bridged or pierced")
         about = f"{many(touches, 'touch', 'touches')}, {units.duration(seconds)}"
-        unit = units.unit_of_report(context.scene, {"size": self._mesh.size})  # as the panel has
-        return f"Tolerance {units.length(tolerance, unit)}: about {about}"
+        unit = {"size": self._mesh.size}  # as the panel has
+        return f"Tolerance {units.say_of(unit, tolerance)}: about {about}"
 
 
 def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, float, float, float]:

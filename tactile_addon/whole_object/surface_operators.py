@@ -18,7 +18,7 @@ from ..touch.settings import length_property
 from ..touch.types import Object, Outcome, Point
 from . import whole_mesh
 from .object_operator import EDGE, Growing, WithTouches, keep, touches_of
-from .object_report import deviation, object_summary, unit_of
+from .object_report import deviation, object_summary
 from .object_touches import ObjectTouches
 
 SEEN = 1.0  # The place is seen from so many sizes of the object, so that what is around it is seen, too.
@@ -138,7 +138,7 @@ class TACTILE_OT_mesh_again(OnSurface, bpy.types.Operator):
         record = self._rewrite(context)
         summary = object_summary(record)
         if self.edge > self._touches.whole.atlas.longest_edge():
-            summary += f"; edges are {units.length(record['edge'], unit_of(record))} long, as thin walls need"
+            summary += f"; edges are {units.say_of(record, record['edge'])} long, as thin walls need"
         return report_done(self, summary)
 
 

@@ -120,7 +120,10 @@ def test_the_patch_of_a_probe_is_where_its_probe_is(empty, suzanne, extension):
         extension.tactile_addon.touch.wording,
     )
     found = {"target": "A", "pose": 1, "residuals": [0.1, 0.2], "is_ambiguous": False}
-    assert report.registration_summary(found) == 'The contacts are 0.1 m off "A" (root mean square)'
+    assert (
+        report.registration_summary({"radius": 1.0, "registration": found})
+        == 'The contacts are 0.1 m off "A" (root mean square)'
+    )
     assert "are 100 mm off" in report.registration_summary(found, ("mm", 1e-3))  # as all in the panel
     patch.parent = None
     depsgraph = empty.context.evaluated_depsgraph_get()
@@ -180,7 +183,7 @@ def test_a_search_that_is_stopped_leaves_the_patch_and_one_that_fails_says_why(
     for _ in steps:
         pass
     assert patch.matrix_world == before
-    assert search.put(1)["target"] == suzanne.name
+    assert search.put(1)["registration"]["target"] == suzanne.name
     assert patch.matrix_world != before
 
     def full(*given, **named):
