@@ -120,11 +120,10 @@ def test_the_patch_of_a_probe_is_where_its_probe_is(empty, suzanne, extension):
         extension.tactile_addon.touch.wording,
     )
     found = {"target": "A", "pose": 1, "residuals": [0.1, 0.2], "is_ambiguous": False}
-    assert (
-        report.registration_summary({"radius": 1.0, "registration": found})
-        == 'The contacts are 0.1 m off "A" (root mean square)'
-    )
-    assert "are 100 mm off" in report.registration_summary(found, ("mm", 1e-3))  # as all in the panel
+    record = {"radius": 1.0, "registration": found}
+    assert report.registration_summary(record) == 'The contacts are 0.1 m off "A" (root mean square)'
+    record["radius"] = 0.001
+    assert "are 100 mm off" in report.registration_summary(record)  # as all in the panel
     patch.parent = None
     depsgraph = empty.context.evaluated_depsgraph_get()
     with pytest.raises(ValueError, match=r"The search has found 5 poses on .*: choose a lower number"):
