@@ -15,6 +15,9 @@ from .units import known, rounded, say_of, unit_of_report
 
 SPREAD = ("mean", "median", "max", "rms")
 FORMULAS = ("=", "+", "-", "@", "\t", "\r", "\n")  # Spreadsheets run text that begins with one of these.
+# A curvature is uncertain if its deviation is larger than itself and than this share of 1 / radius: those of
+# flat faces and cylinders, whose 0 is well known, are below .02, those of bends that noise hides up to .6.
+UNCERTAIN = 0.1
 ROUNDING = 1e-6  # A component below this share of the largest is what single precision leaves of 0.
 
 
@@ -63,7 +66,10 @@ def verdict(report: TouchReport) -> str:
         return "Outdated: touch again"
     if report["doubts"]:
         return f"Doubtful: {report['doubts'][0]['advice']}"
-    return f"Good: heights to ± {say_of(report, report['height_std'])}"
+    height, least = say_of(report, report["height_std"]), UNCERTAIN / report["radius"]
+    if any(report[f"{key}_std"] > max(abs(report[key]), least) for key in ("k1", "k2")):
+        return f"Good heights, to ± {height}; curvatures are uncertain"
+    return f"Good: heights to ± {height}"
 
 
 def reasons(report: Mapping[str, Any]) -> list[str]:

@@ -40,7 +40,7 @@ def ball(empty, millimeters):
 
 def record(status="ok", message="The patch describes its contacts.", **more):
     base = {"status": status, "message": message, "doubts": [], "height_std": 0.0123, "radius": 1.0}
-    return base | more
+    return base | {"k1": -2.0, "k1_std": 0.3, "k2": 0.0, "k2_std": 0.01} | more
 
 
 def test_all_lengths_of_one_object_have_one_unit_without_an_exponent_where_zeros_are_few(extension):
@@ -67,6 +67,24 @@ def test_a_number_has_no_digit_beyond_the_first_one_of_its_deviation(extension, 
     assert units.say(-0.002, -1, UNIT, 7e-4) == "-0.002 ± 0.0007 1/mm"
     flat = {"k1": 2e-40, "k2": -1e-7, "k1_std": 0.01, "k2_std": 0.01, "radius": 1.0}
     assert wording.curvatures(flat) == "0 and 0 1/mm"
+
+
+@pytest.mark.parametrize(
+    ("more", "is_uncertain"),
+    [
+        ({}, False),
+        ({"k2_std": 0.2}, True),
+        ({"k1_std": 2.1}, True),
+        ({"k1_std": 1.9}, False),
+        ({"k2_std": 0.09}, False),  # It is known to be about flat.
+        ({"k2_std": 0.09, "radius": 2.0}, True),
+        ({"k1_std": float("inf")}, True),
+    ],
+)
+def test_a_good_verdict_says_where_curvatures_are_uncertain(wording, more, is_uncertain):
+    said = wording.verdict(record(**more))
+    good = "Good: heights to ± 0.0123 mm"
+    assert said == ("Good heights, to ± 0.0123 mm; curvatures are uncertain" if is_uncertain else good)
 
 
 def test_a_flat_patch_has_no_shape_index(said, empty):
