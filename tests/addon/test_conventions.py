@@ -58,6 +58,10 @@ def test_what_cannot_run_says_why(empty):
         empty.data.objects.remove(obj)
     said = "There is no mesh to touch: add one (Shift A), or import a scan (File > Import)"
     assert refused("pick") == said
+    empty.ops.object.text_add()
+    assert refused("pick") == "Convert the text to a mesh (Object > Convert)"
+    empty.ops.object.delete()
+    assert refused("pick") == said
     on_probes = ("add_plane", "add_planes", "remove_plane", "update", "delete")
     assert {refused(name) for name in on_probes} == {"Select a probe, or pick a reference point first"}
     for name in ("verify", "register", "export_contacts", "export_patch"):
