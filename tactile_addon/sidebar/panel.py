@@ -11,7 +11,7 @@ from bpy.app.translations import pgettext_iface as iface
 from ..comparison.verify_operator import verification_rows, verification_table
 from ..probes import probe
 from ..probes.in_slices import draw_running
-from ..probes.operators import NO_MESH
+from ..probes.operators import no_mesh
 from ..scene import patch_record
 from ..scene.shown import unit_of_range
 from ..scene.viewports import shows_colors
@@ -22,7 +22,14 @@ from ..touch.settings import draw_chosen, draw_fit, draw_noise
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object, PanelMixin
 from ..touch.wording import curvatures, reasons, registration_summary, verdict
-from ..whole_object.object_report import deviation, facets, is_all_within, object_rows, object_verdict
+from ..whole_object.object_report import (
+    deviation,
+    facets,
+    is_all_within,
+    object_reasons,
+    object_rows,
+    object_verdict,
+)
 from .dots import dot
 from .patch_rows import found_values, main_rows, other_rows, plane_rows
 from .rows import draw_rows, draw_sentence
@@ -32,7 +39,6 @@ FACETED = {"facets", "folds"}  # A Subdivision modifier may take these doubts aw
 HELP = "Click on a mesh: a probe feels its surface there and keeps a patch of it with its curvatures"
 OTHER_MODE = "Objects are touched in Object Mode, so the buttons are gray"
 NARROW = 200  # A sidebar of fewer pixels at scale 1 is narrow.
-VERDICT_LINES = 2  # The verdict has this room, so that nothing below it jumps while a probe is dragged.
 ICONS = {"ok": "CHECKMARK"}
 
 
@@ -91,7 +97,7 @@ def _draw_pick(context: bpy.types.Context, layout: bpy.types.UILayout, obj: Obje
     """Draws the button that makes a probe, and what it does or needs."""
     layout.operator("tactile.pick", icon="EYEDROPPER")
     if not any(each.type == "MESH" for each in context.view_layer.objects):
-        draw_sentence(context, layout, NO_MESH, "INFO")
+        draw_sentence(context, layout, no_mesh(context), "INFO")
     elif obj is None or not probe.is_result(obj):
         draw_sentence(context, layout, HELP, "INFO")
 
@@ -137,12 +143,12 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         is_outdated = record["status"] == "outdated"
         if not (is_outdated and failed):  # The failure stands above already.
             words, icon = verdict(record), ICONS.get(record["status"], "ERROR")
-            draw_sentence(context, layout, words, icon, lines=VERDICT_LINES)
-        if found is not None:
-            _draw_remedy(layout, record)
+            draw_sentence(context, layout, words, icon, in_two=True)
         draw_rows(context, layout, main_rows(record), active=not is_outdated)
         _draw_colors(context, layout, patch, "tactile_colors")
         _draw_shown(layout, found, patch)
+        if found is not None:  # It comes and goes while a probe is dragged, so what is above does not jump.
+            _draw_remedy(layout, record)
         if body := _folded(layout, "more", "More"):
             _draw_more(context, body, patch, record)
         if found is None or "verification" in record or "registration" in record:
@@ -167,7 +173,7 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
             return
         record = obj[patch_record.ATLAS_RECORD]
         icon = "CHECKMARK" if is_all_within(record) else "INFO" if record["status"] == "ok" else "ERROR"
-        draw_sentence(context, layout, object_verdict(record), icon)
+        draw_sentence(context, layout, object_verdict(record), icon, in_two=True)
         if words := facets(record):
             draw_sentence(context, layout, words, "INFO")
             layout.operator("tactile.add_subdivision", icon="MOD_SUBSURF")
@@ -181,6 +187,8 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         if body := _folded(layout, "object_more", "More"):
             if patch_record.is_colored(obj):
                 _draw_range(context, body, obj)
+            for words in object_reasons(record):
+                draw_sentence(context, body, words, "BLANK1")
             draw_rows(context, body, object_rows(record))
             body.operator("tactile.mesh_again", icon="MOD_REMESH")
 
@@ -199,9 +207,8 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
             draw_sentence(context, layout, words, "ERROR")
         draw_rows(context, layout, map_rows(record))
         _draw_colors(context, layout, obj, "tactile_map_colors")
-        if record["patches"]:
-            layout.label(text="Medians of the Patches")
-            draw_rows(context, layout, list(median_rows(record)))
+        if record["patches"] and (body := _folded(layout, "map_more", "Medians of the Patches")):
+            draw_rows(context, body, list(median_rows(record)))
 
 
 class TACTILE_PT_probes(_Sidebar, bpy.types.Panel):

@@ -79,7 +79,7 @@ def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Ob
     """Adds a copy of `obj`, painted by the StabilityMap `touched`, to the scene, and returns it."""
     evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
     mesh = bpy.data.meshes.new(f"{obj.name} Stability")
-    painted = bpy.data.objects.new(mesh.name, mesh)
+    painted: Object = bpy.data.objects.new(mesh.name, mesh)
     painted.matrix_world = Matrix.Translation(touched.surface.origin.tolist())
     areas = _paint(mesh, touched)
     is_smooth = read_array(evaluated.data.polygons, "use_smooth", dtype=bool)[touched.owners]
@@ -93,7 +93,8 @@ def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Ob
     painted[VALUES].update({REASON: touched.reason.tolist(), AREA: areas.tolist()})
     painted[patch_record.MAP_RECORD] = touched.report() | {"source": obj.name, "painted": painted.name}
     patch_object.collection(context.scene).objects.link(painted)
-    recolor(painted)
+    # Where one reason holds everywhere, its color shows nothing; setting what is shown colors the map.
+    painted.tactile_map_colors = REASON if len(set(painted[VALUES][REASON])) > 1 else "error"
     show_colors()
     return painted
 

@@ -206,7 +206,7 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
     )
     edge: EDGE
 
-    shown = ("target", "accuracy", "tolerance", "edge", "most", "noise", "seed")
+    shown = ("target", "accuracy", "tolerance", "edge", "noise")
     _expected = None
 
     def _begin(self, context: bpy.types.Context) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.arguments import many
 from ..touch import units
-from ..touch.wording import vector
+from ..touch.wording import reasons, vector
 
 # A surface is good if this share of it is within the tolerance of the mesh, and all within so many.
 WITHIN_SHARE, OFF_TOLERANCES = 0.99, 3.0
@@ -49,8 +49,20 @@ def verdict_of(record: Mapping[str, Any]) -> str:
 
 
 def object_verdict(record: Mapping[str, Any]) -> str:
-    """The verdict and what it rests on, for the panel."""
-    return " ".join(filter(None, (f"{verdict_of(record)}.", record["message"], agreement(record))))
+    """A sentence on whether a whole object is good, and what to do if it is not, as of a patch."""
+    if record["status"] == "outdated":
+        return "Outdated: touch it all over again"
+    if record["doubts"]:
+        return f"{verdict_of(record)}: {record['doubts'][0]['advice']}"
+    if "within" not in record:
+        return f"Good: heights to ± {units.say_of(record, record['height_std'])}"
+    share = within(record["within"], record["deviation_max"] <= record["tolerance"])
+    return f"Good: {share.lower()} of it is within {units.say_of(record, record['tolerance'])} of the mesh"
+
+
+def object_reasons(record: Mapping[str, Any]) -> list[str]:
+    """Sentences on what the verdict rests on."""
+    return [*reasons(record), *filter(None, [agreement(record)])]
 
 
 def is_all_within(record: Mapping[str, Any]) -> bool:
