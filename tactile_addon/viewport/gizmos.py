@@ -93,8 +93,12 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         for each, line in handles:
             self._put(context, each, line, taken)
             each.hide = not apart(each.matrix_basis.translation)
-        self.extent.hide = not apart(center + reach * _right(context))
-        self.extent.matrix_basis = Matrix.LocRotScale(center, matrix.to_quaternion(), [reach] * 3)
+        # The ring is as far out and as high as curves end, so that it lies on surfaces that bend, too.
+        ends = np.concatenate([path[[0, -1]] for path in paths])
+        wide, high = np.median(np.hypot(*ends[:, :2].T)), np.median(ends[:, 2])
+        middle = patch.matrix_world @ Vector((0.0, 0.0, high))
+        self.extent.hide = not apart(middle + wide * _right(context))
+        self.extent.matrix_basis = Matrix.LocRotScale(middle, patch.matrix_world.to_quaternion(), [wide] * 3)
 
     def _put(self, context: bpy.types.Context, handle: Any, line: list[Any], taken: list[Any]) -> None:
         """Puts a handle on a line, as far out as the view is free, or if it is nowhere, on its end.
