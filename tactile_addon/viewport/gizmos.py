@@ -95,7 +95,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
             each.hide = not apart(each.matrix_basis.translation)
         # The ring is as far out and as high as curves end, so that it lies on surfaces that bend, too.
         ends = np.concatenate([path[[0, -1]] for path in paths])
-        wide, high = np.median(np.hypot(*ends[:, :2].T)), np.median(ends[:, 2])
+        wide, high = float(np.median(np.hypot(*ends[:, :2].T))), float(np.median(ends[:, 2]))
         middle = patch.matrix_world @ Vector((0.0, 0.0, high))
         self.extent.hide = not apart(middle + wide * _right(context))
         self.extent.matrix_basis = Matrix.LocRotScale(middle, patch.matrix_world.to_quaternion(), [wide] * 3)
