@@ -44,7 +44,6 @@ MENUS = (
     *preferences.MENUS,
     *contact_operators.MENUS,
     *export_operators.MENUS,
-    *pages.MENUS,
 )
 PROPERTIES = probe.PROPERTIES | shown.PROPERTIES | map_object.PROPERTIES  # Of objects, by name.
 _commands: list[Any] = []

@@ -175,10 +175,3 @@ class TACTILE_OT_export_report(ObjectExport, bpy.types.Operator):
 
     def write(self, obj: Object) -> None:
         write(self.filepath, obj)
-
-
-def draw_export(self: bpy.types.Menu, context: bpy.types.Context) -> None:
-    self.layout.operator(TACTILE_OT_export_report.bl_idname, text="Tactile Report (.html)")
-
-
-MENUS = (("TOPBAR_MT_file_export", draw_export),)

@@ -11,6 +11,7 @@ from ... import core
 from ...core.arguments import many
 from .settings import METHODS
 from .touch_report import TouchReport
+from .types import Point
 from .units import known, rounded, say_of, unit_of_report
 
 SPREAD = ("mean", "median", "max", "rms")
@@ -23,7 +24,6 @@ ROUNDING = 1e-6  # A component below this share of the largest is what single pr
 
 def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
     """(label, value) of everything there is to say of a patch, with lengths in the unit of scene or file."""
-    seconds, unit = report["seconds"], unit_of_report(report)
     contacts = _measured_contacts(report) if "curves" in report else _tracked(report)
     texture = _shared(report, "residual") if report["residual"] else "none"
     total = rounded(report["total_absolute_curvature"], 0, report["radius"])
@@ -34,7 +34,7 @@ def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
         ("contacts", contacts),
         *_lengths(report),
         *([("more planes", added_planes(report))] if report.get("added_planes") else []),
-        ("point", f"{vector(np.divide(report['frame']['origin'], unit[1]))} {unit[0]}".rstrip()),
+        ("point", place(report["frame"]["origin"], report)),
         ("normal", vector(report["frame"]["normal"])),
         ("first principal direction", vector(report["frame"]["d1"])),
         ("principal curvatures", ", ".join(measured(report, key, -1) for key in ("k1", "k2"))),
@@ -50,7 +50,7 @@ def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
         ("suggested next plane", _suggestion(report)),
         ("total absolute curvature", f"{total:.4g}"),
         ("condition number", f"{report['condition_number']:.2g}"),
-        ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in seconds.items())),
+        ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in report["seconds"].items())),
     ]
 
 
@@ -205,6 +205,12 @@ def vector(v: Iterable[float]) -> str:
     components = list(v)
     rounding = ROUNDING * max(map(abs, components))
     return " ".join(f"{x if abs(x) > rounding else 0.0:.5g}" for x in components)
+
+
+def place(point: Point, report: Mapping[str, Any]) -> str:
+    """A place of the world in words."""
+    name, size = unit_of_report(report)
+    return f"{vector(np.divide(point, size))} {name}".rstrip()
 
 
 def measured(report: Mapping[str, Any], key: str, power: int) -> str:

@@ -8,7 +8,6 @@ stick out or stay in the mesh. Material Preview and Rendered move them so, by th
 that an export has.
 """
 
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, cast
 
@@ -18,7 +17,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from ..scene.mesh_data import ABOVE
-from ..scene.patch_record import RECORD, report_of, touched_record
+from ..scene.patch_record import RECORD
 from ..touch.arrays import read_array
 from ..touch.types import Array, Object
 from .curves import nearer
@@ -42,16 +41,17 @@ def draw_above() -> None:
     space: Any = context.space_data
     if space.shading.type != "SOLID" or space.shading.color_type != "VERTEX" or context.mode != "OBJECT":
         return
-    objects: Sequence[Object] = list(context.visible_objects)
-    visible = {obj for obj in objects if obj.type == "MESH" and obj.data.color_attributes.active_color}
-    in_mesh = [obj for obj in visible if touched_record(obj) and not obj.show_in_front]
-    in_front = [obj for obj in visible if obj.show_in_front and (touched_record(obj) or report_of(obj))]
-    for uid in set(_batches) - {obj.session_uid for obj in (*in_mesh, *in_front)}:
+    objects: Sequence[Object] = [
+        obj for obj in context.visible_objects if ABOVE in obj and obj.type == "MESH"
+    ]
+    visible = [obj for obj in objects if ABOVE in obj and obj.data.color_attributes.active_color]
+    for uid in set(_batches) - {obj.session_uid for obj in visible}:
         del _batches[uid]
+    in_mesh, in_front = ([o for o in visible if o.show_in_front is shown] for shown in (False, True))
     gpu.state.depth_test_set("LESS_EQUAL")
     gpu.state.depth_mask_set(True)
     for obj in in_mesh:
-        _draw(obj, obj.get(ABOVE, 0.0))
+        _draw(obj, obj[ABOVE])
     if len(in_front) > 1:
         view: Any = context.region_data.view_matrix
         in_front.sort(key=lambda obj: (RECORD in obj, (view @ obj.matrix_world.translation).z))

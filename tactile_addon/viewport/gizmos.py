@@ -14,7 +14,7 @@ from ..probes import probe
 from ..scene.curves import CURVES
 from ..touch.touch_object import plane_axes
 from .curves import PLANE_COLORS
-from .drag import DRAG_EXTENT, DRAG_TILT, DRAG_TURN, POINT, STEEP, shown_probe
+from .drag import DRAG_EXTENT, DRAG_TILT, DRAG_TURN, POINT, STEEP, ring_of, shown_probe
 from .free_view import is_free
 from .mouse import line_of_sight
 
@@ -79,8 +79,8 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         self.point.matrix_basis = Matrix.Translation(center)
         self.point.hide = settings.target is None
         patch = probe.patch_of(obj)
-        paths = [np.reshape(path, (-1, 3)) for path in patch[CURVES]["contours"]]
-        lines = [[patch.matrix_world @ Vector(p) for p in path] for path in paths]
+        paths = patch[CURVES]["contours"]
+        lines = [[patch.matrix_world @ Vector(p) for p in np.reshape(path, (-1, 3))] for path in paths]
         handles = list(zip(self.turns[: settings.plane_count], lines, strict=False))
         t, up = (Vector(axis) for axis in plane_axes(matrix, settings, active).T.tolist()[:2])
         # If the tilt's plane is seen edge on, a little way of the mouse turns it by much.
@@ -93,12 +93,11 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         for each, line in handles:
             self._put(context, each, line, taken)
             each.hide = not apart(each.matrix_basis.translation)
-        # The ring is as far out and as high as curves end, so that it lies on surfaces that bend, too.
-        ends = np.concatenate([path[[0, -1]] for path in paths])
-        wide, high = float(np.median(np.hypot(*ends[:, :2].T))), float(np.median(ends[:, 2]))
-        middle = patch.matrix_world @ Vector((0.0, 0.0, high))
+        middle, wide = ring_of(patch)
         self.extent.hide = not apart(middle + wide * _right(context))
-        self.extent.matrix_basis = Matrix.LocRotScale(middle, patch.matrix_world.to_quaternion(), [wide] * 3)
+        self.extent.matrix_basis = Matrix.LocRotScale(
+            middle[:], patch.matrix_world.to_quaternion(), [wide] * 3
+        )
 
     def _put(self, context: bpy.types.Context, handle: Any, line: list[Any], taken: list[Any]) -> None:
         """Puts a handle on a line, as far out as the view is free, or if it is nowhere, on its end.

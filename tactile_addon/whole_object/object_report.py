@@ -6,11 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from ...core.arguments import many
 from ..touch import units
-from ..touch.wording import reasons, vector
+from ..touch.wording import place, reasons
 
 # A surface is good if this share of it is within the tolerance of the mesh, and all within so many.
 WITHIN_SHARE, OFF_TOLERANCES = 0.99, 3.0
@@ -35,7 +33,7 @@ def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("tolerance", _length(record, "tolerance")),
         ("standard deviation of the height", units.say_of(record, record["height_std"])),
         ("distance from the mesh", off and f"mean {off}; largest {deviation(record, 'max')}"),
-        ("largest distance at", _place(record)),
+        ("largest distance at", place(record["deviation_place"], record) if off else None),
         ("surface's mesh", f"{vertices}, {triangles}, edges {_length(record, 'edge')}"),
         ("curvatures", _unknown(record)),
     )
@@ -164,11 +162,3 @@ def deviation(record: Mapping[str, Any], what: str) -> str | None:
     if off is None:
         return None
     return units.say_of(record, units.rounded(off, 1, record["size"]))
-
-
-def _place(record: Mapping[str, Any]) -> str | None:
-    """Where in the world the surface and the mesh are farthest apart, or None if that is unknown."""
-    if "deviation_place" not in record:
-        return None
-    name, size = units.unit_of_report(record)
-    return f"{vector(np.divide(record['deviation_place'], size))} {name}".rstrip()
