@@ -41,7 +41,7 @@ def draw_above() -> None:
     space: Any = context.space_data
     if space.shading.type != "SOLID" or space.shading.color_type != "VERTEX" or context.mode != "OBJECT":
         return
-    objects: Sequence[Object] = [
+    objects: list[Object] = list(context.visible_objects)
         obj for obj in context.visible_objects if ABOVE in obj and obj.type == "MESH"
     ]
     visible = [obj for obj in objects if ABOVE in obj and obj.data.color_attributes.active_color]

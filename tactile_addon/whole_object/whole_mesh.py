@@ -40,7 +40,7 @@ RIM_COLOR = (0.15, 0.15, 0.15, 1.0)
 # before them.
 LAYER, OWN_LAYER, LAYERS = 6e-4, 2e-2, 3
 GOLDEN_SECTION = 0.5 * (math.sqrt(5.0) - 1.0)
-# The whole surface, where it is not drawn in front, is drawn above the mesh by this share of the size, and the
+# The whole surface, where it is not drawn in front, is drawn above the mesh by this share of the size, and
 # patches by twice as much, because their rims and straight edges may be below the mesh.
 DRAWN_ABOVE = 5e-3
 
