@@ -42,9 +42,8 @@ def draw_above() -> None:
     if space.shading.type != "SOLID" or space.shading.color_type != "VERTEX" or context.mode != "OBJECT":
         return
     objects: list[Object] = list(context.visible_objects)
-        obj for obj in context.visible_objects if ABOVE in obj and obj.type == "MESH"
-    ]
-    visible = [obj for obj in objects if ABOVE in obj and obj.data.color_attributes.active_color]
+    meshes = [obj for obj in objects if obj.type == "MESH" and ABOVE in obj]
+    visible = [obj for obj in meshes if obj.data.color_attributes.active_color]
     for uid in set(_batches) - {obj.session_uid for obj in visible}:
         del _batches[uid]
     in_mesh, in_front = ([o for o in visible if o.show_in_front is shown] for shown in (False, True))
