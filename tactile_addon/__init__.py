@@ -77,7 +77,7 @@ def unregister() -> None:
     for menu, draw in MENUS:
         getattr(bpy.types, menu).remove(draw)
     pick.unregister_tool()
-    object_operator.forget()
+    object_operator.kept.clear()
     for name in PROPERTIES:
         delattr(bpy.types.Object, name)
     _unregister_classes()

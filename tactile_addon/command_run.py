@@ -15,7 +15,7 @@ import bpy
 
 from .. import core
 from ..core.arguments import many
-from .comparison.register_operator import register_patch
+from .comparison.register_operator import Search
 from .comparison.verify_operator import verification_columns, verify_patch
 from .files import contact_file, export_operators, measured, mesh_file, whole_file
 from .report import pages
@@ -193,7 +193,7 @@ def _compare(patch: Object, options: argparse.Namespace) -> None:
     target = None if options.files else bpy.data.objects[patch[patch_record.RECORD]["source"]]
     if options.onto is not None:
         target = mesh_file.named(options.onto, mesh_file.add(options.onto), options.target or "")
-        register_patch(patch, target, bpy.context.evaluated_depsgraph_get())
+        Search(patch, target, bpy.context.evaluated_depsgraph_get()).put()
     if target is not None:
         verify_patch(patch, target, bpy.context.evaluated_depsgraph_get())
 

@@ -57,8 +57,8 @@ class Search:
         while not futures.wait([self._found], HURRY).done:
             yield
 
-    def put(self, pose: int) -> dict[str, Any]:
-        """Moves the patch to one of the poses, and returns its record, which has `registration` then.
+    def put(self, pose: int = 1) -> dict[str, Any]:
+        """Moves the patch to one of the poses, from 1 on, and returns its record with `registration`.
 
         It waits for the search. Raises ValueError, with a sentence, if that has not found the pose.
         """
@@ -79,17 +79,6 @@ class Search:
             "is_ambiguous": poses[0].is_ambiguous,
         }
         return patch[patch_record.RECORD].to_dict()
-
-
-def register_patch(patch: Object, target: Object, depsgraph: bpy.types.Depsgraph, pose: int = 1) -> None:
-    """Moves the patch object to where its contacts are nearest to the mesh object `target`.
-
-    pose : 1 for the best place, up to POSES for others
-
-    The patch's record gets what was found as `registration`. Raises ValueError with a sentence, and changes
-    nothing, if that cannot be done.
-    """
-    Search(patch, target, depsgraph).put(pose)
 
 
 class TACTILE_OT_register(WithMesh, bpy.types.Operator):

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panels of the sidebar's tab."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -147,20 +147,15 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         draw_rows(context, layout, main_rows(record), active=not is_outdated)
         _draw_colors(context, layout, patch, "tactile_colors")
         _draw_shown(layout, found, patch)
-        if found is not None:  # It comes and goes while a probe is dragged, so what is above does not jump.
-            _draw_remedy(layout, record)
+        # This button comes and goes while a probe is dragged, so that what is above does not jump.
+        if found is not None and is_outdated:
+            layout.operator("tactile.update", icon="FILE_REFRESH")
+        elif found is not None and FACETED.intersection(doubt["code"] for doubt in record["doubts"]):
+            layout.operator("tactile.add_subdivision", icon="MOD_SUBSURF")
         if body := _folded(layout, "more", "More"):
             _draw_more(context, body, patch, record)
         if found is None or "verification" in record or "registration" in record:
             _draw_comparison(context, layout, patch, record)
-
-
-def _draw_remedy(layout: bpy.types.UILayout, record: Mapping[str, Any]) -> None:
-    """Draws the button that helps a probe's patch which is outdated, or felt few facets."""
-    if record["status"] == "outdated":
-        layout.operator("tactile.update", icon="FILE_REFRESH")
-    elif FACETED.intersection(doubt["code"] for doubt in record["doubts"]):
-        layout.operator("tactile.add_subdivision", icon="MOD_SUBSURF")
 
 
 class TACTILE_PT_object(_Sidebar, bpy.types.Panel):

@@ -227,8 +227,9 @@ def _refused(record: Mapping[str, Any]) -> list[str]:
 def map_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(label, value) of how many patches a stability map has, and of the reasons why there are not more."""
     names, refused = {key: name for key, name, _ in REASONS}, [*record["refused"].items()]
+    touched, points = record["touched"], record["points"]
     return [
-        ("Points", _points(record)),
+        ("Points", str(points) if touched == points else f"{touched} of {points}"),
         ("Spacing", units.say_of(record, record["spacing"])),
         ("Patches", str(record["patches"])),
         ("… in Doubt", str(record["in_doubt"])),
@@ -236,11 +237,6 @@ def map_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         *([("No Patch", str(sum(count for _, count in refused)))] if refused else []),
         *((names[key], str(count)) for key, count in refused if count),
     ]
-
-
-def _points(record: Mapping[str, Any]) -> str:
-    touched, points = record["touched"], record["points"]
-    return str(points) if touched == points else f"{touched} of {points}"
 
 
 def facets(record: Mapping[str, Any]) -> str | None:

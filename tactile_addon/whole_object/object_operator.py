@@ -44,23 +44,18 @@ JOINING, MESHING = 3.3, 60.0
 # thinner by the second one have no shorter edges.
 THIN, THINNEST = 16.0, 133.0
 # The ObjectTouches of the last surface by the session_uid of its object; one at most.
-_kept: dict[int, ObjectTouches] = {}
+kept: dict[int, ObjectTouches] = {}
 
 
 def keep(obj: Object, touches: ObjectTouches) -> None:
     """Keeps the touches that made an object, so that its mesh can be made again without new touches."""
-    forget()
-    _kept[obj.session_uid] = touches
+    kept.clear()
+    kept[obj.session_uid] = touches
 
 
 def touches_of(obj: Object | None) -> ObjectTouches | None:
     """The ObjectTouches that made an object, or None if they are no longer there."""
-    return None if obj is None else _kept.get(obj.session_uid)
-
-
-def forget() -> None:
-    """Forgets the touches that are kept."""
-    _kept.clear()
+    return None if obj is None else kept.get(obj.session_uid)
 
 
 class WithTouches(InSlices):

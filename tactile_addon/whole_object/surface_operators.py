@@ -107,8 +107,7 @@ class OnSurface(WithTouches):
         report = self._touches.report() | {"source": obj[patch_record.ATLAS_RECORD]["source"]}
         whole_mesh.rewrite(obj, self._touches.whole, report)
         keep(obj, self._touches)
-        record: dict[str, Any] = obj[patch_record.ATLAS_RECORD].to_dict()
-        return record
+        return obj[patch_record.ATLAS_RECORD].to_dict()
 
 
 class TACTILE_OT_mesh_again(OnSurface, bpy.types.Operator):

@@ -127,7 +127,7 @@ def test_the_patch_of_a_probe_is_where_its_probe_is(empty, suzanne, extension):
     patch.parent = None
     depsgraph = empty.context.evaluated_depsgraph_get()
     with pytest.raises(ValueError, match=r"The search has found 5 poses on .*: choose a lower number"):
-        registration.register_patch(patch, suzanne, depsgraph, pose=99)
+        registration.Search(patch, suzanne, depsgraph).put(99)
 
 
 def imported(bpy, suzanne, tmp_path):
@@ -190,7 +190,7 @@ def test_a_search_that_is_stopped_leaves_the_patch_and_one_that_fails_says_why(
 
     monkeypatch.setattr(registration.core, "register", full)
     with pytest.raises(ValueError, match="is too large to be searched: remove what is far"):
-        registration.register_patch(patch, suzanne, depsgraph)
+        registration.Search(patch, suzanne, depsgraph).put()
     monkeypatch.undo()
     empty.data.objects.remove(patch)
     with pytest.raises(ValueError, match="was deleted while its place was searched for"):
