@@ -71,11 +71,12 @@ class TACTILE_OT_drag(bpy.types.Operator):
         if self.what in (DRAG_TURN, DRAG_TILT):
             found.tactile_probe.active_plane = self.plane
         self._matrix = found.matrix_world.copy()
-        is_ring = self.what == DRAG_EXTENT
-        self._center = ring_of(probe.patch_of(found))[0] if is_ring else self._matrix.translation
+        self._center = self._matrix.translation
         # The handle follows the mouse from here on. Where the button went down is not known, because a busy
         # Blender hears of it late, when the mouse is already elsewhere.
         self._before = self._value = self._free = self._last = self._get(context)
+        if self.what == DRAG_EXTENT:
+            self._center, self._last = ring_of(probe.patch_of(found))
         below = None if self.what == POINT else self._below(context, event)
         if self.what != POINT and below is None:
             self.report({"WARNING"}, "The plane is seen edge on: turn the view to drag this handle")
