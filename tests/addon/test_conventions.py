@@ -48,6 +48,17 @@ def test_lengths_and_angles_know_their_units(empty):
                 assert known.unit == "ROTATION"
 
 
+def test_no_dialog_has_more_than_five_fields(extension):
+    addon = extension.tactile_addon
+    operators = (
+        addon.whole_object.object_operator.TACTILE_OT_touch_all_over,
+        addon.whole_object.surface_operators.TACTILE_OT_mesh_again,
+        addon.whole_object.surface_operators.TACTILE_OT_continue_touching,
+        addon.stability_map.map_operator.TACTILE_OT_stability_map,
+    )
+    assert max(len(operator.shown) for operator in operators) <= 5
+
+
 def test_what_cannot_run_says_why(empty):
     def refused(name):
         with pytest.raises(RuntimeError) as caught:

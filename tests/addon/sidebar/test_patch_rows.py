@@ -227,8 +227,8 @@ class Layout:
     def panel(self, *_, **__):
         return self.part(), self.part()
 
-    def operator(self, *_, text="", **__):
-        self.drawn.append((text, not self.is_gray))
+    def operator(self, name, *_, text="", **__):
+        self.drawn.append((text or name, not self.is_gray))
         return SimpleNamespace()
 
     def prop(self, *_, **__):
@@ -247,6 +247,32 @@ def test_a_value_that_has_no_room_next_to_its_label_stands_below_it(extension, w
     layout, rows = Layout(), [("Shape Index", "0.57"), ("K", "0.00312 ± 0.002 1/mm²")]
     extension.tactile_addon.sidebar.rows.draw_rows(context, layout, rows)
     assert [text for text, _ in layout.drawn] == ["Shape Index", "0.57", *line]
+
+
+@pytest.mark.parametrize(
+    ("sentence", "lines"),
+    [
+        ("Good: heights to ± 1 mm", ["Good", "heights to ± 1 mm"]),
+        ("Doubtful: add a Subdivision modifier if so", ["Doubtful: add a Subdivision", "modifier if so"]),
+        ("Doubtful: " + 20 * "word ", ["Doubtful: word word word word", "word word word word word …"]),
+    ],
+)
+def test_a_verdict_has_two_lines_of_which_none_is_empty(extension, sentence, lines):
+    context = SimpleNamespace(
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)), region=SimpleNamespace(width=250)
+    )
+    layout = Layout()
+    extension.tactile_addon.sidebar.rows.draw_sentence(context, layout, sentence, "INFO", in_two=True)
+    assert [text for text, _ in layout.drawn] == lines
+
+
+def test_the_button_that_helps_is_below_the_curvatures(extension, empty):
+    empty.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
+    empty.ops.tactile.pick(location=(0.6, -0.6, 0.6))
+    record = empty.context.object.children[0]["tactile"]
+    assert {doubt["code"] for doubt in record["doubts"]} & {"facets", "folds"}
+    names = [text for text, _ in drawn_of(empty, extension, empty.context.object)]
+    assert names.index("κ2") < names.index("tactile.add_subdivision")
 
 
 def drawn_of(bpy, extension, obj):
