@@ -107,39 +107,6 @@ class Growing(WithTouches):
             self._growing = None
 
 
-class Expected:
-    """What is expected of an object, whose mesh is kept until the object changes."""
-
-    def __init__(self) -> None:
-        self._shape: tuple[int, int] | None = None
-        self._mesh: DetachedMesh | None = None
-        self.is_faceted = False  # Whether touches would feel the facets of the object one by one.
-        self.warnings: list[str] = []
-
-    def words(
-        self, target: Object, context: bpy.types.Context, tolerance: float, accuracy: str, noise: float
-    ) -> str:
-        """A sentence on the tolerance, the touches and the seconds of an object that will be touched.
-
-        Raises ValueError, with a sentence, for an object that cannot be touched.
-        """
-        depsgraph = context.evaluated_depsgraph_get()
-        vertices = target.evaluated_get(depsgraph).data.vertices if target.type == "MESH" else ()
-        shape = target.session_uid, len(vertices)
-        if shape != self._shape:
-            self._mesh = DetachedMesh(target, depsgraph)
-            self._shape = shape
-        tolerance = tolerance or tolerance_of(self._mesh.size, accuracy, noise)
-        touches, seconds, share, wall = expected(self._mesh, tolerance, noise)
-        self.is_faceted = share >= FACETED
-        self.warnings = ["Touches will feel its facets one by one"] if self.is_faceted else []
-        if wall < THIN_SHARE:
-            self.warnings.append(f"Walls of {100.0 * wall:.2g} % of its size may be bridged or pierced")
-        about = f"{many(touches, 'touch', 'touches')}, {units.duration(seconds)}"
-        unit = {"size": self._mesh.size}  # as the panel has
-        return f"Tolerance {units.say_of(unit, tolerance)}: about {about}"
-
-
 def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, float, float, float]:
     """About how many touches a DetachedMesh takes, seconds, its share with few facets, its thinnest wall's.
 
@@ -202,7 +169,10 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
     edge: EDGE
 
     shown = ("target", "accuracy", "tolerance", "edge", "noise")
-    _expected = None
+    _mesh: DetachedMesh
+    _shape: tuple[int, int] | None = None  # What it is of: the object and the number of its vertices.
+    _warnings: list[str]
+    _is_faceted = False  # Whether touches would feel the facets of the object one by one.
 
     def _begin(self, context: bpy.types.Context) -> None:
         target, found = target_object(context, self.target), probe.probe_of(context.view_layer.objects.active)
@@ -229,14 +199,24 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
         return report_done(self, object_summary(record), record["status"] == "ok")
 
     def _estimate(self, context: bpy.types.Context, target: Object) -> str:
-        """What it will take, in a sentence."""
-        self._expected = self._expected or Expected()
-        return self._expected.words(target, context, self.tolerance, self.accuracy, self.noise)
+        """A sentence on the tolerance, the touches and the seconds. The mesh is kept until it changes."""
+        depsgraph = context.evaluated_depsgraph_get()
+        vertices = target.evaluated_get(depsgraph).data.vertices if target.type == "MESH" else ()
+        if (target.session_uid, len(vertices)) != self._shape:
+            self._mesh, self._shape = DetachedMesh(target, depsgraph), (target.session_uid, len(vertices))
+        tolerance = self.tolerance or tolerance_of(self._mesh.size, self.accuracy, self.noise)
+        touches, seconds, share, wall = expected(self._mesh, tolerance, self.noise)
+        self._is_faceted = share >= FACETED
+        self._warnings = ["Touches will feel its facets one by one"] * self._is_faceted
+        if wall < THIN_SHARE:
+            self._warnings.append(f"Walls of {100.0 * wall:.2g} % of its size may be bridged or pierced")
+        words = units.say_of({"size": self._mesh.size}, tolerance)  # in the unit that the panel has
+        return f"Tolerance {words}: about {many(touches, 'touch', 'touches')}, {units.duration(seconds)}"
 
     def draw(self, context: bpy.types.Context) -> None:
         super().draw(context)
-        layout = self.layout
-        for warning in self._expected.warnings if self._expected else ():
-            layout.label(text=warning, icon="ERROR")
-        if self._expected is not None and self._expected.is_faceted:
-            layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF").target = self.target
+        for warning in self._warnings if self._shape else ():
+            self.layout.label(text=warning, icon="ERROR")
+        if self._is_faceted:
+            idname = TACTILE_OT_add_subdivision.bl_idname
+            self.layout.operator(idname, icon="MOD_SUBSURF").target = self.target

@@ -18,6 +18,7 @@ FACETED = 0.5  # The panel says that curvatures are those of facets from this sh
 def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(label, value) of everything there is to say of a whole object."""
     off, was_touched = deviation(record, "mean"), "touches" in record
+    unknown = record.get("unknown_curvatures") or None
     how = many(record["touches"], "time", "times") if was_touched else _contacts(record)
     vertices = many(record["vertices"], "vertex", "vertices")
     triangles = many(record["triangles"], "triangle", "triangles")
@@ -35,7 +36,7 @@ def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("distance from the mesh", off and f"mean {off}; largest {deviation(record, 'max')}"),
         ("largest distance at", place(record["deviation_place"], record) if off else None),
         ("surface's mesh", f"{vertices}, {triangles}, edges {_length(record, 'edge')}"),
-        ("curvatures", _unknown(record)),
+        ("curvatures", unknown and f"unknown at {many(unknown, 'vertex', 'vertices')} beside edges and rims"),
     )
 
 
@@ -143,12 +144,6 @@ def _surface(record: Mapping[str, Any]) -> str:
     if record.get("uncovered"):
         return f"{within(record['felt'], False)} of the object"
     return "open where the object ends" if record["status"] == "ok" else "open where nothing was felt"
-
-
-def _unknown(record: Mapping[str, Any]) -> str | None:
-    """Where the curvatures are unknown, in words, or None if they are known all over."""
-    count = record.get("unknown_curvatures")
-    return f"unknown at {many(count, 'vertex', 'vertices')} beside edges and rims" if count else None
 
 
 def _length(record: Mapping[str, Any], key: str) -> str | None:
