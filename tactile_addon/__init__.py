@@ -44,7 +44,6 @@ MENUS = (
     *preferences.MENUS,
     *contact_operators.MENUS,
     *export_operators.MENUS,
-    *pages.MENUS,
 )
 PROPERTIES = probe.PROPERTIES | shown.PROPERTIES | map_object.PROPERTIES  # Of objects, by name.
 _commands: list[Any] = []
@@ -78,7 +77,7 @@ def unregister() -> None:
     for menu, draw in MENUS:
         getattr(bpy.types, menu).remove(draw)
     pick.unregister_tool()
-    object_operator.forget()
+    object_operator.kept.clear()
     for name in PROPERTIES:
         delattr(bpy.types.Object, name)
     _unregister_classes()

@@ -15,7 +15,7 @@ import bpy
 
 from .. import core
 from ..core.arguments import many
-from .comparison.register_operator import register_patch
+from .comparison.register_operator import Search
 from .comparison.verify_operator import verification_columns, verify_patch
 from .files import contact_file, export_operators, measured, mesh_file, whole_file
 from .report import pages
@@ -140,8 +140,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     if patch_record.GRAPH in made:
         report["graph"] = json.loads(made[patch_record.GRAPH])
     if options.contacts is not None:
-        r = patch_record.reconstruction_of(made)
-        contact_file.write(options.contacts, contact_file.contacts_of(r))
+        contact_file.write(options.contacts, contact_file.contacts_of(patch_record.reconstruction_of(made)))
     if options.report is not None:
         pages.write(options.report, made)
     if options.output is not None:
@@ -194,7 +193,7 @@ def _compare(patch: Object, options: argparse.Namespace) -> None:
     target = None if options.files else bpy.data.objects[patch[patch_record.RECORD]["source"]]
     if options.onto is not None:
         target = mesh_file.named(options.onto, mesh_file.add(options.onto), options.target or "")
-        register_patch(patch, target, bpy.context.evaluated_depsgraph_get())
+        Search(patch, target, bpy.context.evaluated_depsgraph_get()).put()
     if target is not None:
         verify_patch(patch, target, bpy.context.evaluated_depsgraph_get())
 
@@ -203,8 +202,7 @@ def _open_contacts(options: argparse.Namespace) -> dict[str, Any]:
     """The files as arguments. If no .blend is open, an empty scene gets their unit, so that numbers stay."""
     if not bpy.data.filepath:
         bpy.ops.wm.read_homefile(use_empty=True)
-        unit = measured.read(options.files, options.unit or "FILE", 1.0, options.command == "join").unit
-        _set_unit(unit)
+        _set_unit(measured.read(options.files, options.unit or "FILE", 1.0, options.command == "join").unit)
     paths = [path.absolute() for path in options.files]
     if len({path.parent for path in paths}) > 1:
         raise Misuse("FILE: expected files from one folder")

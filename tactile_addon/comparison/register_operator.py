@@ -57,8 +57,8 @@ class Search:
         while not futures.wait([self._found], HURRY).done:
             yield
 
-    def put(self, pose: int) -> dict[str, Any]:
-        """Moves the patch to one of the poses, and returns its `registration`, a dict.
+    def put(self, pose: int = 1) -> dict[str, Any]:
+        """Moves the patch to one of the poses, from 1 on, and returns its record with `registration`.
 
         It waits for the search. Raises ValueError, with a sentence, if that has not found the pose.
         """
@@ -78,20 +78,7 @@ class Search:
             "vertices": [found.vertex for found in poses],
             "is_ambiguous": poses[0].is_ambiguous,
         }
-        return patch[patch_record.RECORD]["registration"].to_dict()
-
-
-def register_patch(
-    patch: Object, target: Object, depsgraph: bpy.types.Depsgraph, pose: int = 1
-) -> dict[str, Any]:
-    """Moves the patch object to where its contacts are nearest to the mesh object `target`.
-
-    pose : 1 for the best place, up to POSES for others
-
-    The patch's record gets what was found as `registration`, which is returned as a dict. Raises ValueError
-    with a sentence, and changes nothing, if that cannot be done.
-    """
-    return Search(patch, target, depsgraph).put(pose)
+        return patch[patch_record.RECORD].to_dict()
 
 
 class TACTILE_OT_register(WithMesh, bpy.types.Operator):
@@ -122,5 +109,5 @@ class TACTILE_OT_register(WithMesh, bpy.types.Operator):
         return f'Looking for the patch on "{self._search.target}": {seconds:.0f} s', None
 
     def _finish(self, context: bpy.types.Context) -> Outcome:
-        found = self._search.put(self.pose)
-        return report_done(self, registration_summary(found), not found["is_ambiguous"])
+        record = self._search.put(self.pose)
+        return report_done(self, registration_summary(record), not record["registration"]["is_ambiguous"])

@@ -102,8 +102,7 @@ class Verification:
             mean = self._found.get("vertex_distance_mean", 0.0) if height is None else height
             # Another mesh, as a scan, may show only a part of the object.
             missing = self._error.missing if record["source"] == self.target else 0.0
-            error = core.MeshError(mean, missing)
-            record.update(judgment(r, error, record["ended"]))
+            record.update(judgment(r, core.MeshError(mean, missing), record["ended"]))
         return record.to_dict()
 
     def _objects(self) -> tuple[Object, Object]:
@@ -146,10 +145,9 @@ def verification_summary(record: TouchReport) -> tuple[bool, str]:
         )
     if record["status"] != "ok":
         return True, record["message"]
-    unit = units.unit_of_report(bpy.context.scene, record)
-    mean = _length(record, "vertex_distance_mean", unit)
+    mean = _length(record, "vertex_distance_mean")
     most = _length(
-        record, max("vertex_distance_max", "patch_distance_max", key=lambda key: found.get(key, 0.0)), unit
+        record, max("vertex_distance_max", "patch_distance_max", key=lambda key: found.get(key, 0.0))
     )
     return False, (
         f'At {many(vertices, "vertex", "vertices")}, "{name}" is {mean} off the patch on average, and '
@@ -168,38 +166,32 @@ def verification_columns(report: Mapping[str, Any]) -> list[tuple[str, Any]]:
     ]
 
 
-def verification_table(record: Mapping[str, Any], unit: units.Unit) -> list[tuple[str, ...]]:
+def verification_table(record: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """Rows of a label and the values for the mesh and for the contacts; lengths are without unit."""
-    found = record["verification"]
-    symbol, bare = units.symbol(1, unit), ("", unit[1])
-
-    def lengths(key: str) -> Iterator[str]:
-        return (_length(record, f"{what}_distance_{key}", bare) for what in ("vertex", "contact"))
-
-    names = zip(("Mean", "Median", "Maximum", "RMS"), SPREAD, strict=True)
-    return [
-        (f"in {symbol}" if symbol else "Distance", "Mesh", "Contacts"),
-        *((name, *lengths(key)) for name, key in names),
-        ("Points", str(found["vertices"]), str(found["contacts"])),
-    ]
+    found, symbol = record["verification"], units.symbol(1, units.unit_of_report(record))
+    rows = [(f"in {symbol}" if symbol else "Distance", "Mesh", "Contacts")]
+    for name, key in zip(("Mean", "Median", "Maximum", "RMS"), SPREAD, strict=True):
+        mesh, contacts = (_length(record, f"{what}_distance_{key}") for what in ("vertex", "contact"))
+        rows.append((name, mesh.removesuffix(f" {symbol}"), contacts.removesuffix(f" {symbol}")))
+    return [*rows, ("Points", str(found["vertices"]), str(found["contacts"]))]
 
 
-def verification_rows(record: Mapping[str, Any], unit: units.Unit) -> list[tuple[str, str]]:
+def verification_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(label, value) of everything else that a verification has found."""
     found = record["verification"]
     return [
-        ("Fit Error", _length(record, "fit_error", unit)),
-        (f"Error on {found['extra_contours']} More Curves", _length(record, "extra_fit_error", unit)),
+        ("Fit Error", _length(record, "fit_error")),
+        (f"Error on {found['extra_contours']} More Curves", _length(record, "extra_fit_error")),
         ("Total Curvature", f"{found['total_absolute_curvature']:.3g}"),
         ("Overlap", f"{100.0 * found['overlap']:.0f} %"),
-        ("Largest Deviation", _length(record, "patch_distance_max", unit)),
+        ("Largest Deviation", _length(record, "patch_distance_max")),
     ]
 
 
-def _length(record: Mapping[str, Any], key: str, unit: units.Unit) -> str:
+def _length(record: Mapping[str, Any], key: str) -> str:
     """A length in words, or a dash if the verification has not found it."""
     found = record["verification"]
-    return units.say(units.rounded(found[key], 1, record["radius"]), 1, unit) if key in found else "–"
+    return units.say_of(record, units.rounded(found[key], 1, record["radius"])) if key in found else "–"
 
 
 class WithMesh(InSlices):

@@ -175,6 +175,7 @@ def draw_export(self: bpy.types.Menu, context: bpy.types.Context) -> None:
     self.layout.operator(TACTILE_OT_export_contacts.bl_idname, text="Contact Data (.csv)")
     self.layout.operator(TACTILE_OT_export_patch.bl_idname, text="Tactile Patch (.json)")
     self.layout.operator(TACTILE_OT_export_table.bl_idname, text="Table of Tactile Patches (.csv)")
+    self.layout.operator("tactile.export_report", text="Tactile Report (.html)")
 
 
 CLASSES = (TACTILE_OT_export_contacts, TACTILE_OT_export_patch, TACTILE_OT_export_table)

@@ -166,13 +166,20 @@ def fit(
     if flip is not (unknown and bulges > FLAT):
         result = reconstruct(outward=-result.frame.axes[:, 2])
     require_single("patch", result.radius, result.frame.origin)
+    axes = reference_axes(result.frame.axes[:, 2])
     report: TouchReport = {
         "source": source,
         "unit": unit,
         "curves": len(contours),
         "strokes": len(strokes),
         "given_contacts": sum(len(contour.points) for contour in felt),
-        **_report(result, options["method"]),
+        "method": options["method"],
+        "degree": result.patch.degree,
+        **reconstruction_report(result),
+        "axes": axes.tolist(),
+        "vertices": 0,
+        **measures(result),
+        "suggested_plane": suggestion_report(result, axes),
     }
     if distances is not None:
         report["misses"] = distances.tolist()
@@ -187,17 +194,3 @@ def _reference_point(
     if contours:
         return core.common_point(contours)
     return np.mean(np.vstack([stroke.points for stroke in strokes]), axis=0), None
-
-
-def _report(result: core.Reconstruction, method: str) -> TouchReport:
-    """What a fit has found, in the form of a touch's report."""
-    axes = reference_axes(result.frame.axes[:, 2])
-    return {
-        "method": method,
-        "degree": result.patch.degree,
-        **reconstruction_report(result),
-        "axes": axes.tolist(),
-        "vertices": 0,
-        **measures(result),
-        "suggested_plane": suggestion_report(result, axes),
-    }

@@ -141,8 +141,7 @@ def carry(probe: Object, patch: Object) -> None:
     if not np.isfinite(motion).all():  # They are beyond single precision.
         return
     turn = np.array(Matrix(motion.tolist()).to_quaternion().to_matrix(), dtype=float)
-    origin = motion[:3, :3] @ frame[:3, 3] + motion[:3, 3]
-    patch_record.move_record(patch, turn @ frame[:3, :3], origin)
+    patch_record.move_record(patch, turn @ frame[:3, :3], motion[:3, :3] @ frame[:3, 3] + motion[:3, 3])
 
 
 def _numbers(matrix: Matrix | Array) -> list[float]:

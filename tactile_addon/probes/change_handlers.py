@@ -138,7 +138,7 @@ def _concerned(depsgraph: bpy.types.Depsgraph) -> tuple[list[Object], bool]:
     found = [obj for obj in there if is_probe(obj)]
     if scene and not found:
         targets.cache_clear()  # The last one may have been deleted.
-    concerned = [
+    return [
         obj
         for obj in sorted(found, key=lambda probe: probe.name)
         if unsure
@@ -148,8 +148,7 @@ def _concerned(depsgraph: bpy.types.Depsgraph) -> tuple[list[Object], bool]:
             (scene or getattr(obj.tactile_probe.target, "name", None) in named)
             and may_be_outdated(obj, there)
         )
-    ]
-    return concerned, unsure
+    ], unsure
 
 
 def is_pending(probe: Object) -> bool:

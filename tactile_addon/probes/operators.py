@@ -15,7 +15,7 @@ from ..touch.types import Object, Outcome
 from ..touch.wording import fit_summary, sentence
 from .probe import is_result, lock_of, patch_near, probe_of, record_of
 
-NO_MESH = "There is no mesh to touch: add one (Shift A), or import a scan (File > Import)"
+CONVERTIBLE = {"FONT": "text", "CURVE": "curve", "SURFACE": "surface", "META": "metaball"}
 
 
 class TACTILE_OT_reconstruct(PlacedTouch, bpy.types.Operator):
@@ -131,7 +131,15 @@ def is_in_object_mode(operator: type[Any], context: bpy.types.Context, what: str
 def has_mesh(operator: type[Any], context: bpy.types.Context) -> bool:
     """Whether the view layer has a mesh that can be touched; if not, the operator's poll says so."""
     meshes = (obj for obj in context.view_layer.objects if obj.type == "MESH" and not is_result(obj))
-    return polls(operator, any(meshes), NO_MESH)
+    return polls(operator, any(meshes), no_mesh(context))
+
+
+def no_mesh(context: bpy.types.Context) -> str:
+    """What to do where there is no mesh to touch, in a sentence."""
+    for obj in context.view_layer.objects:
+        if obj.type in CONVERTIBLE:
+            return f"Convert the {CONVERTIBLE[obj.type]} to a mesh (Object > Convert)"
+    return "There is no mesh to touch: add one (Shift A), or import a scan (File > Import)"
 
 
 def has_target(operator: type[Any], context: bpy.types.Context) -> bool:

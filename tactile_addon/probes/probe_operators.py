@@ -10,7 +10,6 @@ import bpy
 from bpy.props import IntProperty, StringProperty
 
 from ..scene import patch_object, patch_record
-from ..touch import units
 from ..touch.settings import MOST_PLANES, TARGET, length_property, silent
 from ..touch.types import Object, OperatorMixin, Outcome
 from ..touch.wording import added_planes
@@ -99,8 +98,7 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
             for plane in touched.report["added_planes"]:
                 _add(settings, plane)
             touch_again.adopt(found, touched, depsgraph, complete=True)
-        unit = units.unit_of_report(context.scene, touched.report)
-        return report_done(self, added_planes(touched.report, unit))
+        return report_done(self, added_planes(touched.report))
 
     def draw(self, context: bpy.types.Context) -> None:
         self.layout.use_property_split = True
@@ -214,8 +212,7 @@ class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
         target = found.tactile_probe.target
-        patch = probe.patch_of(found)
-        patch_object.remove_objects([obj for obj in (patch, found) if obj is not None])
+        patch_object.remove_objects([obj for obj in (probe.patch_of(found), found) if obj is not None])
         if target is not None:  # What comes next, as another pick, is about it.
             make_active(context, target)
         return {"FINISHED"}

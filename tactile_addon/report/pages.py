@@ -24,7 +24,7 @@ from ..touch import units
 from ..touch.arrays import read_array
 from ..touch.types import Array, Object
 from ..touch.wording import readable_rows, verdict
-from ..whole_object.object_report import object_summary, object_table_rows, unit_of
+from ..whole_object.object_report import object_summary, object_table_rows
 from . import page, parts
 
 OUTERMOST = "The outermost bars count all larger distances."
@@ -40,35 +40,32 @@ SHOWN = (
 def patch_page(patch: Object, r: core.Reconstruction) -> str:
     """The page of a patch object and its core.Reconstruction."""
     record = patch[patch_record.RECORD].to_dict()
-    unit = units.unit_of_report(bpy.context.scene, record)
     off, weights, words = _deviations(patch, r, record)
     bands = parts.shares_of(r.radius, "radius")
     sections = [
-        page.verdict(f"{verdict(record, unit)}. {record['message']}", record["status"] == "ok"),
-        page.section("Pictures", *_pictures(patch, r, record, unit)),
-        *parts.deviations(off, weights, r.mean_height_std, unit, bands, f"{words} {OUTERMOST}"),
-        *parts.ending(readable_rows(record), record, unit),
+        page.verdict(f"{verdict(record)}. {record['message']}", record["status"] == "ok"),
+        page.section("Pictures", *_pictures(patch, r, record)),
+        *parts.deviations(off, weights, r.mean_height_std, record, bands, f"{words} {OUTERMOST}"),
+        *parts.ending(readable_rows(record), record),
     ]
     return page.page(f"{patch.name}: a patch of {record['source']}", sections)
 
 
-def _pictures(
-    patch: Object, r: core.Reconstruction, record: Mapping[str, Any], unit: units.Unit
-) -> Iterator[str]:
+def _pictures(patch: Object, r: core.Reconstruction, record: Mapping[str, Any]) -> Iterator[str]:
     points, corners = values(patch.data, POSITION), corners_of(patch.data)
     contacts = r.contacts[:, :2] * record["radius"] / r.radius  # The object's mesh has this scale.
     for attribute, title, power in SHOWN if _has_mesh(record) else SHOWN[:-1]:
         found = values(patch.data, attribute)
-        limit, scale = _scale(attribute, found, power, unit)
+        limit, scale = _scale(attribute, found, power, record)
         picture = page.triangles(points[:, :2], corners, shades(found[corners].mean(axis=1), limit), contacts)
         yield page.figure(f"{picture}<br>{scale}", f"{title}, along the normal, with the contacts")
 
 
-def _scale(attribute: str, found: Array, power: int, unit: units.Unit) -> tuple[float, str]:
+def _scale(attribute: str, found: Array, power: int, record: Mapping[str, Any]) -> tuple[float, str]:
     """The range of the colors of values (n,), and a picture of them."""
     limit = symmetric_range(found, parts.LEAST_RANGE)
     low = 0.0 if attribute in patch_record.POSITIVE else -1.0
-    return limit, page.scale(limit, parts.label(power, unit), low)
+    return limit, page.scale(limit, parts.label(power, record), low)
 
 
 def _has_mesh(record: Mapping[str, Any]) -> bool:
@@ -88,10 +85,10 @@ def object_page(obj: Object) -> str:
     """The page of a whole object. Raises ValueError if it was edited."""
     patch_record.require_colored(obj)
     record, mesh = obj[patch_record.ATLAS_RECORD].to_dict(), obj.data
-    was_touched, unit = "touches" in record, unit_of(record)
+    was_touched = "touches" in record
     attribute, title, power = SHOWN[-1] if was_touched else SHOWN[-2]
     found = values(mesh, attribute)
-    limit, scale = _scale(attribute, found, power, unit)
+    limit, scale = _scale(attribute, found, power, record)
     colors = shades(found, limit)[read_array(mesh.loops, "vertex_index", dtype=np.int32)]
     sections = [
         page.verdict(f"{object_summary(record)}. {record['message']}", record["status"] == "ok"),
@@ -101,26 +98,25 @@ def object_page(obj: Object) -> str:
         bands = [(f"± {times:g} × the tolerance", times * record["tolerance"]) for times in TOLERANCES]
         words = f"Shares of the area by its distance from the mesh. {OUTERMOST}"
         areas = parts.vertex_areas(mesh)
-        sections += parts.deviations(found, areas, record["height_std"], unit, bands, words)
-    sections += parts.ending(object_table_rows(record), record, unit)
+        sections += parts.deviations(found, areas, record["height_std"], record, bands, words)
+    sections += parts.ending(object_table_rows(record), record)
     return page.page(f"{obj.name}: the surface of a whole object", sections)
 
 
 def map_page(painted: Object) -> str:
     """The page of a map object."""
     record = painted[patch_record.MAP_RECORD].to_dict()
-    unit = units.unit_of_report(bpy.context.scene, record)
     colors = read_array(painted.data.attributes[MAP_COLOR].data, "color_srgb", 4)
     sections = [
         page.verdict(map_object.map_summary(record), record["patches"] > 0 and not record["in_doubt"]),
-        page.section("Pictures", _legend(painted, record, unit), *parts.three_sides(painted.data, colors)),
-        *_errors(painted, record, unit),
-        *parts.ending(map_object.map_table_rows(record), record, unit),
+        page.section("Pictures", _legend(painted, record), *parts.three_sides(painted.data, colors)),
+        *_errors(painted, record),
+        *parts.ending(map_object.map_table_rows(record), record),
     ]
     return page.page(f"{painted.name}: a stability map of {record['source']}", sections)
 
 
-def _legend(painted: Object, record: Mapping[str, Any], unit: units.Unit) -> str:
+def _legend(painted: Object, record: Mapping[str, Any]) -> str:
     """The legend of the colors."""
     shown = painted.tactile_map_colors
     swatches = "".join(page.swatch(color, words) for words, color in map_object.swatches(painted))
@@ -128,11 +124,11 @@ def _legend(painted: Object, record: Mapping[str, Any], unit: units.Unit) -> str
         return swatches
     title = next(words for key, words, *_ in map_object.MAP_QUANTITIES if key == shown)
     low = "1" if shown in map_object.LOGARITHMIC else "0"
-    high = units.say(record["color_limit"], map_object.MAP_POWERS[shown], unit)
+    high = units.say_of(record, record["color_limit"], map_object.MAP_POWERS[shown])
     return page.words(f"{title}: pale green at {low}, dark red from {high} on.") + swatches
 
 
-def _errors(painted: Object, record: Mapping[str, Any], unit: units.Unit) -> list[str]:
+def _errors(painted: Object, record: Mapping[str, Any]) -> list[str]:
     """The sections on errors, in which each touch counts by the area that has its color."""
     found = painted[map_object.VALUES]
     errors, stds, weights = (np.array(found[name]) for name in ("error", HEIGHT_STD, map_object.AREA))
@@ -142,7 +138,7 @@ def _errors(painted: Object, record: Mapping[str, Any], unit: units.Unit) -> lis
     std = float(np.median(stds[counts]))
     size = (record["extent"], "extent") if record["extent"] else (record["reach_median"], "median reach")
     words = f"Shares of the area by the error of the touch whose color it has. {OUTERMOST}"
-    return parts.deviations(errors[counts], weights[counts], std, unit, parts.shares_of(*size), words)
+    return parts.deviations(errors[counts], weights[counts], std, record, parts.shares_of(*size), words)
 
 
 def write(path: str | Path, obj: Object) -> None:
@@ -179,10 +175,3 @@ class TACTILE_OT_export_report(ObjectExport, bpy.types.Operator):
 
     def write(self, obj: Object) -> None:
         write(self.filepath, obj)
-
-
-def draw_export(self: bpy.types.Menu, context: bpy.types.Context) -> None:
-    self.layout.operator(TACTILE_OT_export_report.bl_idname, text="Tactile Report (.html)")
-
-
-MENUS = (("TOPBAR_MT_file_export", draw_export),)

@@ -43,14 +43,14 @@ def deviations(
     off: Array,
     weights: Array,
     std: float,
-    unit: units.Unit,
+    record: Mapping[str, Any],
     reaches: Sequence[tuple[str, float]],
     caption: str,
 ) -> list[str]:
     """The sections with a histogram of lengths (n,), with weights (n,), and their shares within bands."""
     limit = symmetric_range(off, LEAST_RANGE)
-    picture = page.figure(page.histogram(off, weights, limit, label(1, unit)), caption)
-    table = bands(off, weights, std, unit, reaches)
+    picture = page.figure(page.histogram(off, weights, limit, label(1, record)), caption)
+    table = bands(off, weights, std, record, reaches)
     return [page.section("Deviations", picture), page.section("Tolerance bands", table)]
 
 
@@ -60,7 +60,7 @@ def shares_of(length: float, what: str) -> list[tuple[str, float]]:
 
 
 def bands(
-    off: Array, weights: Array, std: float, unit: units.Unit, reaches: Sequence[tuple[str, float]]
+    off: Array, weights: Array, std: float, record: Mapping[str, Any], reaches: Sequence[tuple[str, float]]
 ) -> str:
     """The shares of the weights (n,) within named lengths, and within one to three standard deviations."""
 
@@ -68,7 +68,7 @@ def bands(
         is_within = np.abs(off) <= reach
         share = 1.0 if is_within.all() else weights[is_within].sum() / weights.sum()
         # It is rounded down: only all of it is 100 %.
-        return name, units.say(reach, 1, unit), f"{math.floor(1e3 * share + 1e-9) / 10.0:.1f} %", due
+        return name, units.say_of(record, reach), f"{math.floor(1e3 * share + 1e-9) / 10.0:.1f} %", due
 
     rows = [row(*reach) for reach in reaches]
     rows += [
@@ -78,32 +78,33 @@ def bands(
     return page.table(rows, ("band", "", "within it", "expected, if normal"))
 
 
-def ending(rows: Iterable[tuple[str, str]], record: Mapping[str, Any], unit: units.Unit) -> list[str]:
+def ending(rows: Iterable[tuple[str, str]], record: Mapping[str, Any]) -> list[str]:
     """The sections at the end of a page: what was found, as rows, and how."""
     return [
         page.section("What was found", page.table(rows)),
-        page.section("Settings", page.table(_settings(record, unit))),
+        page.section("Settings", page.table(_settings(record))),
         page.section("Versions", page.table(_versions())),
     ]
 
 
-def label(power: int, unit: units.Unit) -> Callable[[float], str]:
+def label(power: int, record: Mapping[str, Any]) -> Callable[[float], str]:
     """A function that gives a value in length^power in words."""
-    return lambda value: units.say(value, power, unit) if value else "0"
+    return lambda value: units.say_of(record, value, power) if value else "0"
 
 
-def _settings(record: Mapping[str, Any], unit: units.Unit) -> list[tuple[str, str]]:
+def _settings(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(label, value) of the settings that a record has."""
     names = ("method", "degree", "tolerance", "most", "spacing", "extent", "step", "noise", "seed")
-    rows = [(WORDS.get(name, name), _setting(name, record[name], unit)) for name in names if name in record]
+    rows = [(WORDS.get(name, name), _setting(name, record)) for name in names if name in record]
     planes = [f"{azimuth:.0f}° leaning {tilt:.0f}°" for azimuth, tilt in record.get("planes", ())]
     return [*rows, *([("planes", ", ".join(planes))] if planes else [])]
 
 
-def _setting(name: str, value: Any, unit: units.Unit) -> str:
+def _setting(name: str, record: Mapping[str, Any]) -> str:
+    value = record[name]
     if name in CHOSEN and not value:
         return "auto"
-    return units.say(value, 1, unit) if name in LENGTHS else str(value)
+    return units.say_of(record, value) if name in LENGTHS else str(value)
 
 
 def _versions() -> list[tuple[str, str]]:
@@ -135,8 +136,7 @@ def three_sides(mesh: bpy.types.Mesh, colors: Array) -> Iterator[str]:
         # Shading shows the shape where colors are pale. What is nearer is drawn later.
         light = DARKEST + (1.0 - DARKEST) * np.abs(normals[:, sight, None])
         order = np.argsort(sign * points[corners, sight].mean(axis=1))
-        picture = page.triangles(points[:, axes], corners[order], (light * found)[order])
-        yield page.figure(picture, words)
+        yield page.figure(page.triangles(points[:, axes], corners[order], (light * found)[order]), words)
 
 
 def _coarse(mesh: bpy.types.Mesh, colors: Array) -> tuple[Array, Array, Array]:

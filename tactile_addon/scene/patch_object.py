@@ -71,8 +71,7 @@ def remove_objects(objects: Sequence[Object]) -> None:
     materials = {material for mesh in meshes for material in mesh.materials if material is not None}
     bpy.data.batch_remove(meshes)
     bpy.data.batch_remove([material for material in materials if not material.users])
-    empty = [c for c in bpy.data.collections if _is_own(c) and not (c.objects or c.children)]
-    bpy.data.batch_remove(empty)
+    bpy.data.batch_remove([c for c in bpy.data.collections if _is_own(c) and not (c.objects or c.children)])
 
 
 def _is_own(collection: bpy.types.Collection) -> bool:
@@ -127,13 +126,12 @@ def _fill_patch(obj: Object, touched: Touched) -> None:
     if touched.report["is_verified"] and touched.surface is not None:
         world = frame.to_world(points), d.normal @ frame.axes.T
         deviation = touched.surface.deviations(*world, result.radius)
-    places = np.column_stack([result.domain.places(points[:, :2]), np.zeros(len(points))])
     attributes = [
         *((name, _shown(name, result, points)) for name in QUANTITIES_OF_A_FIT),
         (GAUSSIAN_STD, core.gaussian_curvature_stds(result, *points[:, :2].T)),
         (DEVIATION, deviation),
         (NORMAL, d.normal),
-        (PLACE, places),
+        (PLACE, np.column_stack([result.domain.places(points[:, :2]), np.zeros(len(points))])),
         (COLOR, np.ones((len(points), 4))),
     ]
     fill(obj.data, points, triangles, attributes)

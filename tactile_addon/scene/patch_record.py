@@ -60,12 +60,9 @@ def report_of(patch: Object) -> TouchReport | None:
 
 
 def extent_of(patch: Object | None) -> float:
-    """The extent in the report of a patch, which need not be complete; 0 if there is no patch or extent."""
-    try:
-        extent = patch[RECORD]["extent"]
-    except (KeyError, TypeError):
-        return 0.0
-    return extent if isinstance(extent, float) else 0.0
+    """The extent in the report of a patch; 0 if there is no patch or extent, or somebody has edited it."""
+    report = None if patch is None else report_of(patch)
+    return 0.0 if report is None else report.get("extent", 0.0)
 
 
 def edited(obj: Object) -> ValueError:

@@ -119,20 +119,19 @@ def _record(obj: Object) -> Any:
     return obj[ATLAS_RECORD] if ATLAS_RECORD in obj else report_of(obj)
 
 
-def unit_of_range(obj: Object, scene: bpy.types.Scene) -> tuple[int, units.Unit]:
+def unit_of_range(obj: Object) -> tuple[int, units.Unit]:
     """The power of length in the quantity that a patch or whole object shows, and the unit of its legend."""
     report, power = _record(obj), POWERS[obj.tactile_colors]
-    return power, ("", 1.0) if report is None else units.unit_of_report(scene, report)
+    return power, ("", 1.0) if report is None else units.unit_of_report(report)
 
 
 def _get(obj: Object) -> float:
-    power, unit = unit_of_range(obj, bpy.context.scene)
-    limit = obj.get(RANGE) or (_record(obj) or {}).get("color_limit", 0.0)
-    return limit / unit[1] ** power
+    power, unit = unit_of_range(obj)
+    return (obj.get(RANGE) or (_record(obj) or {}).get("color_limit", 0.0)) / unit[1] ** power
 
 
 def _set(obj: Object, value: float) -> None:
-    power, unit = unit_of_range(obj, bpy.context.scene)
+    power, unit = unit_of_range(obj)
     set_range(obj, value * unit[1] ** power)
 
 

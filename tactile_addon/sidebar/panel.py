@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panels of the sidebar's tab."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -12,7 +12,7 @@ from ... import core
 from ..comparison.verify_operator import verification_rows, verification_table
 from ..probes import probe
 from ..probes.in_slices import draw_running
-from ..probes.operators import NO_MESH
+from ..probes.operators import no_mesh
 from ..scene import patch_record
 from ..scene.shown import unit_of_range
 from ..scene.viewports import shows_colors
@@ -22,9 +22,15 @@ from ..touch import units
 from ..touch.settings import draw_chosen, draw_fit, draw_noise
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object, PanelMixin
-from ..touch.units import Unit
 from ..touch.wording import curvatures, reasons, registration_summary, verdict
-from ..whole_object.object_report import deviation, facets, is_all_within, object_rows, object_verdict
+from ..whole_object.object_report import (
+    deviation,
+    facets,
+    is_all_within,
+    object_reasons,
+    object_rows,
+    object_verdict,
+)
 from .dots import dot
 from .patch_rows import found_values, main_rows, other_rows, plane_rows
 from .rows import draw_rows, draw_sentence
@@ -33,7 +39,6 @@ TAB = "Tactile"
 HELP = "Click on a mesh: a probe feels its surface there and keeps a patch of it with its curvatures"
 OTHER_MODE = "Objects are touched in Object Mode, so the buttons are gray"
 NARROW = 200  # A sidebar of fewer pixels at scale 1 is narrow.
-VERDICT_LINES = 2  # The verdict has this room, so that nothing below it jumps while a probe is dragged.
 ICONS = {"ok": "CHECKMARK"}
 
 
@@ -49,14 +54,14 @@ class _Sidebar(PanelMixin):
 
 
 class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
-    bl_idname = "TACTILE_PT_probe"
     bl_label = "Tactile Probe"
 
     def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
         if context.mode != "OBJECT":
             draw_sentence(context, layout, OTHER_MODE, "INFO")
-            leave = layout.operator("object.mode_set", text="Go to Object Mode", icon="OBJECT_DATAMODE")
-            leave.mode = "OBJECT"
+            layout.operator(
+                "object.mode_set", text="Go to Object Mode", icon="OBJECT_DATAMODE"
+            ).mode = "OBJECT"
         found = probe.probe_of(obj)
         if found is None:
             _draw_pick(context, layout, obj)
@@ -69,7 +74,7 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         row.operator("tactile.delete", text="", icon="TRASH")
         settings, record = found.tactile_probe, probe.record_of(found)
         layout.prop(settings, "target")
-        chosen = found_values(record, context.scene)
+        chosen = found_values(record)
         draw_chosen(layout, settings, "extent", chosen)
         _draw_planes(context, layout, settings)
         row = layout.row()
@@ -92,7 +97,7 @@ def _draw_pick(context: bpy.types.Context, layout: bpy.types.UILayout, obj: Obje
     """Draws the button that makes a probe, and what it does or needs."""
     layout.operator("tactile.pick", icon="EYEDROPPER")
     if not any(each.type == "MESH" for each in context.view_layer.objects):
-        draw_sentence(context, layout, NO_MESH, "INFO")
+        draw_sentence(context, layout, no_mesh(context), "INFO")
     elif obj is None or not probe.is_result(obj):
         draw_sentence(context, layout, HELP, "INFO")
 
@@ -117,7 +122,6 @@ def _draw_planes(context: bpy.types.Context, layout: bpy.types.UILayout, setting
 
 
 class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
-    bl_idname = "TACTILE_PT_result"
     bl_label = "Patch"
 
     @classmethod
@@ -136,32 +140,27 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         if record is None:
             layout.label(text="This patch was edited: touch again", icon="ERROR")
             return
-        unit = units.unit_of_report(context.scene, record)
         is_outdated = record["status"] == "outdated"
         if not (is_outdated and failed):  # The failure stands above already.
-            icon = ICONS.get(record["status"], "ERROR")
-            draw_sentence(context, layout, verdict(record, unit), icon, lines=VERDICT_LINES)
-        if found is not None:
-            _draw_remedy(layout, record)
-        draw_rows(context, layout, main_rows(record, unit), active=not is_outdated)
+            words, icon = verdict(record), ICONS.get(record["status"], "ERROR")
+            draw_sentence(context, layout, words, icon, in_two=True)
+        draw_rows(context, layout, main_rows(record), active=not is_outdated)
         _draw_colors(context, layout, patch, "tactile_colors")
         _draw_shown(layout, found, patch)
+        # This button comes and goes while a probe is dragged, so that what is above does not jump.
+        if found is not None and is_outdated:
+            layout.operator("tactile.update", icon="FILE_REFRESH")
+        elif found is not None and any(
+            doubt["code"] == "folds" or core.SUBDIVIDE in doubt["advice"] for doubt in record["doubts"]
+        ):
+            layout.operator("tactile.add_subdivision", icon="MOD_SUBSURF")
         if body := _folded(layout, "more", "More"):
-            _draw_more(context, body, patch, record, unit)
+            _draw_more(context, body, patch, record)
         if found is None or "verification" in record or "registration" in record:
-            _draw_comparison(context, layout, patch, record, unit)
-
-
-def _draw_remedy(layout: bpy.types.UILayout, record: Mapping[str, Any]) -> None:
-    """Draws the button that helps a probe's patch which is outdated, or felt few facets."""
-    if record["status"] == "outdated":
-        layout.operator("tactile.update", icon="FILE_REFRESH")
-    elif any(doubt["code"] == "folds" or core.SUBDIVIDE in doubt["advice"] for doubt in record["doubts"]):
-        layout.operator("tactile.add_subdivision", icon="MOD_SUBSURF")
+            _draw_comparison(context, layout, patch, record)
 
 
 class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
-    bl_idname = "TACTILE_PT_object"
     bl_label = "Whole Object"
 
     def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
@@ -170,9 +169,8 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         if obj is None or patch_record.ATLAS_RECORD not in obj:
             return
         record = obj[patch_record.ATLAS_RECORD]
-        good = "CHECKMARK" if is_all_within(record) else "INFO"
-        icon = good if record["status"] == "ok" else "ERROR"
-        draw_sentence(context, layout, object_verdict(record), icon)
+        icon = "CHECKMARK" if is_all_within(record) else "INFO" if record["status"] == "ok" else "ERROR"
+        draw_sentence(context, layout, object_verdict(record), icon, in_two=True)
         if words := facets(record):
             draw_sentence(context, layout, words, "INFO")
             layout.operator("tactile.add_subdivision", icon="MOD_SUBSURF")
@@ -186,12 +184,13 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         if body := _folded(layout, "object_more", "More"):
             if patch_record.is_colored(obj):
                 _draw_range(context, body, obj)
+            for words in object_reasons(record):
+                draw_sentence(context, body, words, "BLANK1")
             draw_rows(context, body, object_rows(record))
             body.operator("tactile.mesh_again", icon="MOD_REMESH")
 
 
 class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
-    bl_idname = "TACTILE_PT_map"
     bl_label = "Stability Map"
 
     def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
@@ -201,18 +200,15 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
             return
         layout.operator("tactile.pick", text="Probe on the Map", icon="EYEDROPPER").new = True
         record = obj[patch_record.MAP_RECORD]
-        unit = units.unit_of_report(context.scene, record)
         if words := map_facets(record):
             draw_sentence(context, layout, words, "ERROR")
-        draw_rows(context, layout, map_rows(record, unit))
+        draw_rows(context, layout, map_rows(record))
         _draw_colors(context, layout, obj, "tactile_map_colors")
-        if record["patches"]:
-            layout.label(text="Medians of the Patches")
-            draw_rows(context, layout, list(median_rows(record, unit)))
+        if record["patches"] and (body := _folded(layout, "map_more", "Medians of the Patches")):
+            draw_rows(context, body, list(median_rows(record)))
 
 
 class TACTILE_PT_probes(_Sidebar, bpy.types.Panel):
-    bl_idname = "TACTILE_PT_probes"
     bl_label = "Probes"
     bl_options = {"DEFAULT_CLOSED"}
 
@@ -224,24 +220,25 @@ class TACTILE_PT_probes(_Sidebar, bpy.types.Panel):
             record, words = probe.record_of(found), found.tactile_probe.message
             icon: Any = "ERROR" if record is None else ICONS.get(record["status"], "ERROR")
             if record is not None:
-                words = curvatures(record, units.unit_of_report(context.scene, record))
+                words = curvatures(record)
             text, is_active = f"{found.name}   {words}", found == probe.probe_of(obj)
-            go = column.operator("tactile.activate", text=text, icon=icon, depress=is_active, translate=False)
-            go.name = found.name
+            column.operator(
+                "tactile.activate", text=text, icon=icon, depress=is_active, translate=False
+            ).name = found.name
         row = layout.row(align=True)
         row.operator("tactile.export_table", text="Table", icon="EXPORT")
         row.operator("tactile.export_report", text="Report", icon="FILE_TEXT")
 
 
 def _draw_more(
-    context: bpy.types.Context, layout: bpy.types.UILayout, patch: Object, record: TouchReport, unit: Unit
+    context: bpy.types.Context, layout: bpy.types.UILayout, patch: Object, record: TouchReport
 ) -> None:
     """Draws what the fit says of itself, the range of the colors, and all other numbers."""
     is_current = record["status"] != "outdated"
     _draw_range(context, layout, patch)
     for i, words in enumerate(reasons(record)):
         draw_sentence(context, layout, words, "BLANK1" if i else ICONS.get(record["status"], "ERROR"))
-    for rows in (other_rows(record, unit), plane_rows(record, unit)):  # The labels of planes are long.
+    for rows in (other_rows(record), plane_rows(record)):  # The labels of planes are long.
         draw_rows(context, layout, rows, active=is_current)
     if probe.probe_of(patch) is not None:
         layout.operator("tactile.verify", icon="VIEWZOOM")
@@ -263,8 +260,8 @@ def _draw_range(context: bpy.types.Context, layout: bpy.types.UILayout, patch: O
     row = layout.row()
     row.use_property_split = False
     name = iface("Range" if patch_record.RANGE in patch else "Range (Auto)")
-    symbol = units.symbol(*unit_of_range(patch, context.scene))
-    row.prop(patch, "tactile_range", text=f"{name} {symbol}".rstrip(), translate=False)
+    words = f"{name} {units.symbol(*unit_of_range(patch))}"
+    row.prop(patch, "tactile_range", text=words.rstrip(), translate=False)
 
 
 def _draw_shown(layout: bpy.types.UILayout, found: Object | None, patch: Object) -> None:
@@ -278,7 +275,7 @@ def _draw_shown(layout: bpy.types.UILayout, found: Object | None, patch: Object)
 
 
 def _draw_comparison(
-    context: bpy.types.Context, layout: bpy.types.UILayout, patch: Object, record: TouchReport, unit: Unit
+    context: bpy.types.Context, layout: bpy.types.UILayout, patch: Object, record: TouchReport
 ) -> None:
     """Draws where the patch was put on a mesh, and how far it is off one, if these are known."""
     if probe.probe_of(patch) is None:
@@ -286,15 +283,14 @@ def _draw_comparison(
         layout.operator("tactile.register", icon="SNAP_ON")
         layout.operator("tactile.verify", icon="VIEWZOOM")
     if "registration" in record:
-        draw_sentence(context, layout, registration_summary(record["registration"], unit), "SNAP_ON")
+        draw_sentence(context, layout, registration_summary(record), "SNAP_ON")
     if "verification" not in record:
         return
     layout = layout.column()
     layout.active = record["status"] != "outdated"
     layout.label(text=record["verification"]["target"], icon="MESH_DATA", translate=False)
-    table = [(label, " | ".join(values)) for label, *values in verification_table(record, unit)]
-    draw_rows(context, layout, table)
-    draw_rows(context, layout, verification_rows(record, unit))
+    for rows in (verification_table(record), verification_rows(record)):
+        draw_rows(context, layout, [(label, " | ".join(values)) for label, *values in rows])
 
 
 PANELS = (TACTILE_PT_probe, TACTILE_PT_result, TACTILE_PT_object, TACTILE_PT_map, TACTILE_PT_probes)

@@ -18,7 +18,6 @@ ENTRIES = (
 
 
 class VIEW3D_MT_tactile(bpy.types.Menu):
-    bl_idname = "VIEW3D_MT_tactile"
     bl_label = "Tactile Patch"
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -31,7 +30,7 @@ class VIEW3D_MT_tactile(bpy.types.Menu):
 
 def _draw_in_object(self: bpy.types.Menu, context: bpy.types.Context) -> None:
     self.layout.separator()
-    self.layout.menu(VIEW3D_MT_tactile.bl_idname)
+    self.layout.menu(VIEW3D_MT_tactile.__name__)
 
 
 def _draw_in_add(self: bpy.types.Menu, context: bpy.types.Context) -> None:

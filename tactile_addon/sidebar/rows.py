@@ -114,14 +114,20 @@ def draw_rows(
 
 
 def draw_sentence(
-    context: bpy.types.Context, layout: bpy.types.UILayout, sentence: str, icon: Any, lines: int | None = None
+    context: bpy.types.Context, layout: bpy.types.UILayout, sentence: str, icon: Any, in_two: bool = False
 ) -> None:
-    """Draws a sentence in as many lines as the sidebar's width needs, or in just as many as given."""
+    """Draws a sentence in as many lines as the sidebar's width needs, or in just two.
+
+    So nothing below a verdict jumps while a probe is dragged; a short one is broken at its colon.
+    """
     column = layout.column(align=True)
     column.scale_y = 0.8
-    width = max(16, int(_letters(context)))
-    found = textwrap.wrap(sentence, width, max_lines=lines, placeholder=" …")
-    for i, line in enumerate([*found, *[""] * ((lines or 0) - len(found))]):
+    found = textwrap.wrap(
+        sentence, max(16, int(_letters(context))), max_lines=2 if in_two else None, placeholder=" …"
+    )
+    if in_two and len(found) < 2:
+        found = [*sentence.partition(": ")[::2]]
+    for i, line in enumerate(found):
         column.label(text=line, icon=icon if i == 0 else "BLANK1")
 
 

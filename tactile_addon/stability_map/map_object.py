@@ -79,7 +79,7 @@ def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Ob
     """Adds a copy of `obj`, painted by the StabilityMap `touched`, to the scene, and returns it."""
     evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
     mesh = bpy.data.meshes.new(f"{obj.name} Stability")
-    painted = bpy.data.objects.new(mesh.name, mesh)
+    painted: Object = bpy.data.objects.new(mesh.name, mesh)
     painted.matrix_world = Matrix.Translation(touched.surface.origin.tolist())
     areas = _paint(mesh, touched)
     is_smooth = read_array(evaluated.data.polygons, "use_smooth", dtype=bool)[touched.owners]
@@ -93,7 +93,8 @@ def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Ob
     painted[VALUES].update({REASON: touched.reason.tolist(), AREA: areas.tolist()})
     painted[patch_record.MAP_RECORD] = touched.report() | {"source": obj.name, "painted": painted.name}
     patch_object.collection(context.scene).objects.link(painted)
-    recolor(painted)
+    # Where one reason holds everywhere, its color shows nothing; setting what is shown colors the map.
+    painted.tactile_map_colors = REASON if len(set(painted[VALUES][REASON])) > 1 else "error"
     show_colors()
     return painted
 
@@ -194,9 +195,8 @@ def inputs_of(painted: Object) -> dict[str, Any]:
 
 def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(label, value) of everything there is to say of a map."""
-    unit = units.unit_of_report(bpy.context.scene, record)
     names = ("spacing", "extent", "step")
-    lengths = [units.say(record[name], 1, unit) if record[name] else "auto" for name in names]
+    lengths = [units.say_of(record, record[name]) if record[name] else "auto" for name in names]
     return [
         (
             "touched",
@@ -206,7 +206,7 @@ def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("refused", ", ".join(_refused(record)) or "none"),
         ("fit", fit(record)),
         (", ".join(names), ", ".join(lengths)),
-        *((f"median {title.lower()}", value) for title, value in median_rows(record, unit)),
+        *((f"median {title.lower()}", value) for title, value in median_rows(record)),
     ]
 
 
@@ -224,23 +224,19 @@ def _refused(record: Mapping[str, Any]) -> list[str]:
     return [f"{count} {names[key]}" for key, count in record["refused"].items() if count]
 
 
-def map_rows(record: Mapping[str, Any], unit: units.Unit) -> list[tuple[str, str]]:
+def map_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(label, value) of how many patches a stability map has, and of the reasons why there are not more."""
     names, refused = {key: name for key, name, _ in REASONS}, [*record["refused"].items()]
+    touched, points = record["touched"], record["points"]
     return [
-        ("Points", _points(record)),
-        ("Spacing", units.say(record["spacing"], 1, unit)),
+        ("Points", str(points) if touched == points else f"{touched} of {points}"),
+        ("Spacing", units.say_of(record, record["spacing"])),
         ("Patches", str(record["patches"])),
         ("… in Doubt", str(record["in_doubt"])),
         *([("… on Facets", str(record["few_facets"]))] if record.get("few_facets") else []),
         *([("No Patch", str(sum(count for _, count in refused)))] if refused else []),
         *((names[key], str(count)) for key, count in refused if count),
     ]
-
-
-def _points(record: Mapping[str, Any]) -> str:
-    touched, points = record["touched"], record["points"]
-    return str(points) if touched == points else f"{touched} of {points}"
 
 
 def facets(record: Mapping[str, Any]) -> str | None:
@@ -251,13 +247,13 @@ def facets(record: Mapping[str, Any]) -> str | None:
     return f"Curvature of the facets, not of the shape, at {many(count, 'point', 'points')}"
 
 
-def median_rows(record: Mapping[str, Any], unit: units.Unit) -> Iterator[tuple[str, str]]:
+def median_rows(record: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """(label, value) of the medians over the patches of a stability map that are known."""
     for name, title, _, power in MAP_QUANTITIES:
         if f"{name}_median" in record:
             found = record[f"{name}_median"]
             # In single precision a little is left of 0.
-            yield title, units.say(units.rounded(found, power, record["spacing"]), power, unit)
+            yield title, units.say_of(record, units.rounded(found, power, record["spacing"]), power)
 
 
 def _show(obj: Object, context: bpy.types.Context) -> None:

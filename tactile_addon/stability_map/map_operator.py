@@ -63,8 +63,7 @@ class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
         self._map.surface.require_source(context)
 
     def _finish(self, context: bpy.types.Context) -> Outcome:
-        target = self._map.surface.require_same(context)
-        painted = map_object.insert(context, target, self._map)
+        painted = map_object.insert(context, self._map.surface.require_same(context), self._map)
         make_active(context, painted)
         record = painted[patch_record.MAP_RECORD].to_dict()
         return report_done(self, map_object.map_summary(record), record["patches"] > 0)

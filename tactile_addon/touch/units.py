@@ -19,7 +19,7 @@ ADAPTIVE = {
 METERS = dict(zip((*ADAPTIVE["METRIC"], *ADAPTIVE["IMPERIAL"]), core.UNIT_METERS.items(), strict=True))
 # In an adaptive unit lengths are at least 1 or this, because few count micrometers or thous.
 LEAST = {"MILLIMETERS": 1e-2, "INCHES": 1e-2}
-LEAST_SHOWN, SHOWN = 1e-4, 5e-2  # A length below the first is in a unit in which it is at least the second.
+PLAIN = 1e-6  # Numbers from here on have no exponent, although Python writes one below 1e-4.
 SHARE = 0.1  # The unit suits this share of an object, which is about the radius of a patch.
 ZERO = 1e-6  # A number below this, in units of the radius or the size, counts as 0.
 SUPERSCRIPTS = {1: "", 2: "²"}
@@ -42,29 +42,30 @@ def unit_of(scene: bpy.types.Scene, size: float) -> Unit:
     return symbol, meters / settings.scale_length
 
 
-def unit_of_report(scene: bpy.types.Scene, report: Mapping[str, Any]) -> Unit:
+def unit_of_report(report: Mapping[str, Any]) -> Unit:
     """The unit of all numbers of a patch, a map or a whole object, which is one for all of one object."""
     size = report.get("object_size") or report.get("size")
-    return unit_of(scene, SHARE * size if size else report["radius"])
+    return unit_of(bpy.context.scene, SHARE * size if size else report["radius"])
+
+
+def say_of(report: Mapping[str, Any], value: float, power: int = 1, std: float | None = None) -> str:
+    """A value in length^power in words, in the unit of a report."""
+    return say(value, power, unit_of_report(report), std)
 
 
 def say(value: float, power: int, unit: Unit, std: float | None = None) -> str:
     """A value in length^power in words, such as "0.0123 mm" or "-4.2 ± 0.3 1/mm²"."""
-    if power == 1 and 0.0 < abs(value) < LEAST_SHOWN * unit[1]:
-        unit = _finer(unit, abs(value))
     scale = unit[1] ** power
     if std is None:
-        return f"{value / scale:.3g} {symbol(power, unit)}".strip()
+        return f"{_digits(value / scale)} {symbol(power, unit)}".strip()
     value, spread = known(value / scale, std / scale), float(f"{std / scale:.1g}")
     return f"{value:.3g} ± {spread:g} {symbol(power, unit)}".strip()
 
 
-def _finer(unit: Unit, length: float) -> Unit:
-    """The largest unit of the same system that suits a length; the same if it has no name or none suits."""
-    systems = ([METERS[name] for name in names] for names in ADAPTIVE.values())
-    system = next((units for units in systems if unit[0] in dict(units)), [])
-    units = ((name, unit[1] * meters / core.UNIT_METERS[unit[0]]) for name, meters in system)
-    return next((each for each in units if SHOWN * each[1] <= length), unit)
+def _digits(number: float) -> str:
+    """Three digits of a number, which has no exponent as long as few zeros do, so that eyes can compare."""
+    is_short = PLAIN <= abs(number) < 1e-4
+    return f"{float(f'{number:.3g}'):.8f}".rstrip("0") if is_short else f"{number:.3g}"
 
 
 def rounded(value: float, power: int, size: float) -> float:
@@ -79,10 +80,10 @@ def known(value: float, std: float) -> float:
     return round(value, -int(f"{std:.0e}".partition("e")[2])) + 0.0  # -0.0 + 0.0 is 0.0.
 
 
-def length(value: float, unit: Unit | None = None) -> str:
-    """A length in words for a message, in this unit or in that of the open scene."""
+def length(value: float) -> str:
+    """A length in words for a message, in the unit of the open scene."""
     size = abs(value) if 0.0 < abs(value) < math.inf else 1.0
-    return say(value, 1, unit or unit_of(bpy.context.scene, size))
+    return say(value, 1, unit_of(bpy.context.scene, size))
 
 
 def duration(seconds: float) -> str:

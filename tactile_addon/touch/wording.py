@@ -5,50 +5,52 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-import bpy
 import numpy as np
 
 from ... import core
 from ...core.arguments import many
 from .settings import METHODS
 from .touch_report import TouchReport
-from .units import Unit, known, length, rounded, say, unit_of_report
+from .types import Point
+from .units import known, rounded, say_of, unit_of_report
 
 SPREAD = ("mean", "median", "max", "rms")
 FORMULAS = ("=", "+", "-", "@", "\t", "\r", "\n")  # Spreadsheets run text that begins with one of these.
+# A curvature is uncertain if its deviation is larger than itself and than this share of 1 / radius: those of
+# flat faces and cylinders, whose 0 is well known, are below .02, those of bends that noise hides up to .6.
+UNCERTAIN = 0.1
 ROUNDING = 1e-6  # A component below this share of the largest is what single precision leaves of 0.
 
 
 def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
     """(label, value) of everything there is to say of a patch, with lengths in the unit of scene or file."""
-    seconds, unit = report["seconds"], unit_of_report(bpy.context.scene, report)
     contacts = _measured_contacts(report) if "curves" in report else _tracked(report)
-    texture = _shared(report, "residual", unit) if report["residual"] else "none"
+    texture = _shared(report, "residual") if report["residual"] else "none"
     total = rounded(report["total_absolute_curvature"], 0, report["radius"])
     return [
         ("touched", report["source"]),
-        ("verdict", f"{verdict(report, unit)}. {report['message']}"),
+        ("verdict", f"{verdict(report)}. {report['message']}"),
         ("fit", fit(report)),
         ("contacts", contacts),
-        *_lengths(report, unit),
-        *([("more planes", added_planes(report, unit))] if report.get("added_planes") else []),
-        ("point", f"{vector(np.divide(report['frame']['origin'], unit[1]))} {unit[0]}".rstrip()),
+        *_lengths(report),
+        *([("more planes", added_planes(report))] if report.get("added_planes") else []),
+        ("point", place(report["frame"]["origin"], report)),
         ("normal", vector(report["frame"]["normal"])),
         ("first principal direction", vector(report["frame"]["d1"])),
-        ("principal curvatures", ", ".join(measured(report, key, -1, unit) for key in ("k1", "k2"))),
-        ("Gaussian curvature", measured(report, "gaussian_curvature", -2, unit)),
-        ("mean curvature", measured(report, "mean_curvature", -1, unit)),
+        ("principal curvatures", ", ".join(measured(report, key, -1) for key in ("k1", "k2"))),
+        ("Gaussian curvature", measured(report, "gaussian_curvature", -2)),
+        ("mean curvature", measured(report, "mean_curvature", -1)),
         ("shape index", "none, it is flat" if is_flat(report) else f"{report['shape_index']:.3f}"),
-        ("curvedness", said(report, "curvedness", -1, unit)),
+        ("curvedness", said(report, "curvedness", -1)),
         ("texture beside the polynomial", texture),
-        ("contacts off the patch, mean", _shared(report, "fit_error", unit)),
-        ("standard deviation of the height", _shared(report, "height_std", unit)),
-        ("mesh to patch", _verification(report, unit)),
-        *_verified_rows(report, unit),
-        ("suggested next plane", _suggestion(report["suggested_plane"], unit)),
+        ("contacts off the patch, mean", _shared(report, "fit_error")),
+        ("standard deviation of the height", _shared(report, "height_std")),
+        ("mesh to patch", _verification(report)),
+        *_verified_rows(report),
+        ("suggested next plane", _suggestion(report)),
         ("total absolute curvature", f"{total:.4g}"),
         ("condition number", f"{report['condition_number']:.2g}"),
-        ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in seconds.items())),
+        ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in report["seconds"].items())),
     ]
 
 
@@ -58,13 +60,16 @@ def fit(report: Mapping[str, Any]) -> str:
     return f"{name}, degree {report['degree']}"
 
 
-def verdict(report: TouchReport, unit: Unit) -> str:
+def verdict(report: TouchReport) -> str:
     """A sentence on whether a patch is good, and what to do if it is not."""
     if report["status"] == "outdated":
         return "Outdated: touch again"
     if report["doubts"]:
         return f"Doubtful: {report['doubts'][0]['advice']}"
-    return f"Good: heights to ± {say(report['height_std'], 1, unit)}"
+    height, least = say_of(report, report["height_std"]), UNCERTAIN / report["radius"]
+    if any(report[f"{key}_std"] > max(abs(report[key]), least) for key in ("k1", "k2")):
+        return f"Good heights, to ± {height}; curvatures are uncertain"
+    return f"Good: heights to ± {height}"
 
 
 def reasons(report: Mapping[str, Any]) -> list[str]:
@@ -79,12 +84,12 @@ def is_flat(report: Mapping[str, Any]) -> bool:
     return not any(known(rounded(report[key], -1, radius), report[f"{key}_std"]) for key in ("k1", "k2"))
 
 
-def added_planes(report: TouchReport, unit: Unit) -> str:
-    """A sentence on what added planes have brought, in the unit."""
+def added_planes(report: TouchReport) -> str:
+    """A sentence on what added planes have brought."""
     added = report["added_planes"]
     if not added:
         return "One more plane would not help much"
-    before, after = (say(std, 1, unit) for std in (added[0]["height_std_before"], added[-1]["height_std"]))
+    before, after = (say_of(report, std) for std in (added[0]["height_std_before"], added[-1]["height_std"]))
     azimuths = ", ".join(f"{plane['azimuth']:.0f}°" for plane in added)
     return f"Planes added at {azimuths}: ± {before} has become ± {after}"
 
@@ -106,14 +111,12 @@ def _tracked(report: TouchReport) -> str:
     return f"{report['contacts']} on {len(report['planes'])} curves, which end {where}"
 
 
-def _lengths(report: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
+def _lengths(report: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Rows with the lengths of a touch; for measured curves, how far they miss their common point."""
     names = [name for name in ("step", "extent", "radius") if name in report]
-    rows = [(", ".join(names), ", ".join(say(report[name], 1, unit) for name in names))]
+    rows = [(", ".join(names), ", ".join(say_of(report, report[name]) for name in names))]
     if "misses" in report:
-        rows.append(
-            ("curves miss it by", ", ".join(_length(miss, report, unit) for miss in report["misses"]))
-        )
+        rows.append(("curves miss it by", ", ".join(_length(miss, report) for miss in report["misses"])))
     return rows
 
 
@@ -131,68 +134,69 @@ def sentence(error: Exception) -> str:
 
 def fit_summary(report: TouchReport) -> str:
     """A sentence on a fit: the verdict on it, and the curvatures."""
-    unit = unit_of_report(bpy.context.scene, report)
-    return f"{verdict(report, unit)}. Curvatures {curvatures(report, unit)}"
+    return f"{verdict(report)}. Curvatures {curvatures(report)}"
 
 
-def curvatures(report: Mapping[str, Any], unit: Unit) -> str:
+def curvatures(report: Mapping[str, Any]) -> str:
     """Both principal curvatures in words, without their standard deviations, such as "-2 and 0.5 1/m"."""
-    first, second = (say(known(report[key], report[f"{key}_std"]), -1, unit) for key in ("k1", "k2"))
+    first, second = (say_of(report, known(report[key], report[f"{key}_std"]), -1) for key in ("k1", "k2"))
     shared = second.partition(" ")[2]
     return f"{first.removesuffix(f' {shared}')} and {second}"
 
 
-def _verification(report: TouchReport, unit: Unit) -> str:
+def _verification(report: TouchReport) -> str:
     """The distances of the mesh's vertices from the patch in words, if there are any."""
     if "curves" in report:
         return "there is none"
     if not report["vertices"]:
         return "no vertex of the mesh lies over the patch"
     mean, farthest = (
-        _shared(report, "vertex_distance_mean", unit),
-        _length(report["vertex_distance_max"], report, unit),
+        _shared(report, "vertex_distance_mean"),
+        _length(report["vertex_distance_max"], report),
     )
     return f"mean {mean}; largest {farthest}; {many(report['vertices'], 'vertex', 'vertices')}"
 
 
-def _verified_rows(report: TouchReport, unit: Unit) -> list[tuple[str, str]]:
+def _verified_rows(report: TouchReport) -> list[tuple[str, str]]:
     """Rows on the registration onto a mesh and the verification against it, which only some reports have."""
     found, rows = report.get("verification"), []
     if "registration" in report:
-        rows.append(("put onto", registration_summary(report["registration"], unit)))
+        rows.append(("put onto", registration_summary(report)))
     if found is None:
         return rows
     names = [name for name in ("vertex", "contact") if f"{name}_distance_mean" in found]
-    more = f"{_length(found['extra_fit_error'], report, unit)}, " if "extra_fit_error" in found else ""
+    more = f"{_length(found['extra_fit_error'], report)}, " if "extra_fit_error" in found else ""
     points = many(found["extra_points"], "point", "points")
     curves = many(found["extra_contours"], "curve", "curves")
     return [
         *rows,
-        *((f"{name} distances", _spread(report, f"{name}_distance", unit)) for name in names),
+        *((f"{name} distances", _spread(report, f"{name}_distance")) for name in names),
         ("distance on more curves", f"{more}{points} on {curves}"),
         ("overlap", f"{100.0 * found['overlap']:.0f} % of the area"),
     ]
 
 
-def registration_summary(found: Mapping[str, Any], unit: Unit | None = None) -> str:
-    """A sentence on where a patch was put by registration, in this unit or in that of the residual."""
-    residual = found["residuals"][found["pose"] - 1]
-    words = f'The contacts are {length(residual, unit)} off "{found["target"]}" (root mean square)'
+def registration_summary(report: TouchReport) -> str:
+    """A sentence on where a patch was put by registration."""
+    found = report["registration"]
+    residual = say_of(report, found["residuals"][found["pose"] - 1])
+    words = f'The contacts are {residual} off "{found["target"]}" (root mean square)'
     if not found["is_ambiguous"]:
         return words
     return f"{words}; others of its {len(found['residuals'])} poses are about as good"
 
 
-def _spread(report: TouchReport, what: str, unit: Unit) -> str:
+def _spread(report: TouchReport, what: str) -> str:
     """Mean, median, largest and root mean square of distances of the verification in words."""
     found = report["verification"]
-    return ", ".join(f"{key} {_length(found[f'{what}_{key}'], report, unit)}" for key in SPREAD)
+    return ", ".join(f"{key} {_length(found[f'{what}_{key}'], report)}" for key in SPREAD)
 
 
-def _suggestion(plane: Mapping[str, Any], unit: Unit) -> str:
+def _suggestion(report: TouchReport) -> str:
+    plane = report["suggested_plane"]
     return (
         f"azimuth {plane['azimuth']:.0f} degrees, along {vector(plane['tangent'])}; "
-        f"would take the standard deviation of the height to {say(plane['expected_height_std'], 1, unit)}"
+        f"would take the standard deviation of the height to {say_of(report, plane['expected_height_std'])}"
     )
 
 
@@ -203,25 +207,31 @@ def vector(v: Iterable[float]) -> str:
     return " ".join(f"{x if abs(x) > rounding else 0.0:.5g}" for x in components)
 
 
-def measured(report: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
+def place(point: Point, report: Mapping[str, Any]) -> str:
+    """A place of the world in words."""
+    name, size = unit_of_report(report)
+    return f"{vector(np.divide(point, size))} {name}".rstrip()
+
+
+def measured(report: Mapping[str, Any], key: str, power: int) -> str:
     """A value of the report, which is in length^power, in words with its standard deviation."""
-    return say(rounded(report[key], power, report["radius"]), power, unit, report[f"{key}_std"])
+    return say_of(report, rounded(report[key], power, report["radius"]), power, report[f"{key}_std"])
 
 
-def said(report: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
+def said(report: Mapping[str, Any], key: str, power: int) -> str:
     """A value of the report, which is in length^power, in words."""
-    return say(rounded(report[key], power, report["radius"]), power, unit)
+    return say_of(report, rounded(report[key], power, report["radius"]), power)
 
 
-def _shared(report: Mapping[str, Any], key: str, unit: Unit) -> str:
+def _shared(report: Mapping[str, Any], key: str) -> str:
     """A length of the report in words, with its share of the radius."""
     share = 100.0 * report[key] / report["radius"]
-    return f"{said(report, key, 1, unit)}, {share:.2f} % of the radius"
+    return f"{said(report, key, 1)}, {share:.2f} % of the radius"
 
 
-def _length(value: float, report: Mapping[str, Any], unit: Unit) -> str:
+def _length(value: float, report: Mapping[str, Any]) -> str:
     """A length of the report in words, as `rounded` has it."""
-    return say(rounded(value, 1, report["radius"]), 1, unit)
+    return say_of(report, rounded(value, 1, report["radius"]))
 
 
 def cell(words: str) -> str:

@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Solid shading: maps and incomplete surfaces above their mesh, and patches above each other and surfaces.
 
-Where two objects are in one place, either would show here and there. So they are drawn once more: moved along
-normals, or one after the other, the nearest last. Material Preview and Rendered move them by their material.
-Nothing is moved that an export has.
+Where two objects are in one place, either would show here and there. So they are drawn once more: nearer to
+the eye, or one after the other, the nearest last. Along normals, which are means at vertices, edges would
+stick out or stay in the mesh. Material Preview and Rendered move them so, by their material. Nothing is moved
+that an export has.
 """
 
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, cast
 
@@ -17,9 +17,10 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from ..scene.mesh_data import ABOVE
-from ..scene.patch_record import RECORD, report_of, touched_record
+from ..scene.patch_record import RECORD
 from ..touch.arrays import read_array
 from ..touch.types import Array, Object
+from .curves import nearer
 
 DARKEST, BRIGHTEST = 0.3, 0.7  # The share of its color that a face has edge on, and upright, as in Solid.
 VERTEX = """
@@ -40,16 +41,16 @@ def draw_above() -> None:
     space: Any = context.space_data
     if space.shading.type != "SOLID" or space.shading.color_type != "VERTEX" or context.mode != "OBJECT":
         return
-    objects: Sequence[Object] = list(context.visible_objects)
-    visible = {obj for obj in objects if obj.type == "MESH" and obj.data.color_attributes.active_color}
-    in_mesh = [obj for obj in visible if touched_record(obj) and not obj.show_in_front]
-    in_front = [obj for obj in visible if obj.show_in_front and (touched_record(obj) or report_of(obj))]
-    for uid in set(_batches) - {obj.session_uid for obj in (*in_mesh, *in_front)}:
+    objects: list[Object] = list(context.visible_objects)
+    meshes = [obj for obj in objects if obj.type == "MESH" and ABOVE in obj]
+    visible = [obj for obj in meshes if obj.data.color_attributes.active_color]
+    for uid in set(_batches) - {obj.session_uid for obj in visible}:
         del _batches[uid]
+    in_mesh, in_front = ([o for o in visible if o.show_in_front is shown] for shown in (False, True))
     gpu.state.depth_test_set("LESS_EQUAL")
     gpu.state.depth_mask_set(True)
     for obj in in_mesh:
-        _draw(obj, obj.get(ABOVE, 0.0))
+        _draw(obj, obj[ABOVE])
     if len(in_front) > 1:
         view: Any = context.region_data.view_matrix
         in_front.sort(key=lambda obj: (RECORD in obj, (view @ obj.matrix_world.translation).z))
@@ -61,36 +62,40 @@ def draw_above() -> None:
 
 
 def _draw(obj: Object, height: float) -> None:
-    """Draws an object this far along its normals."""
+    """Draws an object this far toward the eye, to the same place on the screen."""
     shader, pushed = _shader(), cast(Any, gpu.matrix.push_pop())  # which the stubs make no context
+    view: Any = bpy.context.region_data
+    depth = (
+        -(view.view_matrix @ obj.matrix_world.translation).z if view.is_perspective else view.view_distance
+    )
+    share = height * obj.matrix_world.median_scale / max(depth, 1e-30)
     with pushed:
+        gpu.matrix.load_matrix(nearer(view, min(share, 0.5)) @ gpu.matrix.get_model_view_matrix())
         gpu.matrix.multiply_matrix(obj.matrix_world)
         shader.uniform_float("ModelViewMatrix", gpu.matrix.get_model_view_matrix())
         shader.uniform_float("ProjectionMatrix", gpu.matrix.get_projection_matrix())
-        _batch(obj, height).draw(shader)
+        _batch(obj).draw(shader)
 
 
-def _batch(obj: Object, height: float) -> gpu.types.GPUBatch:
+def _batch(obj: Object) -> gpu.types.GPUBatch:
     """The triangles of an object, made anew if it shows something else."""
     mesh, color = obj.data, obj.data.color_attributes.active_color
     colors = read_array(color.data, "color", 4)
     points = read_array(mesh.vertices, "co", 3)
-    key = hash(points.tobytes()), hash(colors.tobytes()), height
+    key = hash(points.tobytes()), hash(colors.tobytes())
     known = _batches.get(obj.session_uid)
     if known is None or known[0] != key:
         if color.domain == "POINT":
             colors = colors[read_array(mesh.loops, "vertex_index", dtype=np.int32)]
-        _batches[obj.session_uid] = key, _new_batch(mesh, points, colors, height)
+        _batches[obj.session_uid] = key, _new_batch(mesh, points, colors)
     return _batches[obj.session_uid][1]
 
 
-def _new_batch(mesh: bpy.types.Mesh, points: Array, colors: Array, height: float) -> gpu.types.GPUBatch:
-    """The triangles of a mesh with points (n, 3) and colors (k, 4) of corners, moved along its normals."""
+def _new_batch(mesh: bpy.types.Mesh, points: Array, colors: Array) -> gpu.types.GPUBatch:
+    """The triangles of a mesh with points (n, 3) and colors (k, 4) of corners."""
     mesh.calc_loop_triangles()
     loops = read_array(mesh.loop_triangles, "loops", 3, dtype=np.int32).ravel()
     corners = read_array(mesh.loop_triangles, "vertices", 3, dtype=np.int32).ravel()
-    normals = read_array(mesh.vertices, "normal", 3)
-    points = points + height * normals
     facing = read_array(mesh.corner_normals, "vector", 3)
     columns: dict[str, Any] = {"pos": points[corners], "normal": facing[loops], "color": colors[loops]}
     return batch_for_shader(_shader(), "TRIS", columns)

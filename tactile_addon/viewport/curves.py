@@ -28,8 +28,9 @@ PLANE_COLORS = [
 WHITE, BLACK, DARK = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.6)
 WIDTH, OUTLINE = 1.5, 0.75  # Of a curve, and of the dark line on either side of it, in pixels at scale 1.
 STROKE = 3.0  # The size of a contact of a stroke.
-NEARER = 0.998  # Where curves may be hidden, they are drawn at this share of their distance.
+NEARER = 0.002  # Where curves may be hidden, they are drawn nearer by this share of their distance.
 FONT, LETTER = 0, 12.0  # Blender's own font; the size of the letters of principal directions.
+APART = 2.0  # Letters whose places are not farther apart than so many of their sizes would overlap.
 
 
 def draw_curves() -> None:
@@ -46,7 +47,7 @@ def draw_curves() -> None:
         pushed = cast(Any, gpu.matrix.push_pop())  # which the stubs make no context
         lift = Matrix.Translation((0.0, 0.0, 0.0 if is_solid else obj.get(ABOVE, 0.0)))
         with pushed:
-            gpu.matrix.load_matrix(_nearer(context.region_data) @ gpu.matrix.get_model_view_matrix())
+            gpu.matrix.load_matrix(nearer(context.region_data, NEARER) @ gpu.matrix.get_model_view_matrix())
             gpu.matrix.multiply_matrix(obj.matrix_world @ lift)
             draw(obj[CURVES], DARK, obj.tactile_contours, obj.tactile_directions)
     gpu.state.depth_test_set("NONE")
@@ -59,11 +60,11 @@ def _shown_patches(context: bpy.types.Context) -> list[Object]:
     return [o for o in objects if CURVES in o and (o.tactile_contours or o.tactile_directions)]
 
 
-def _nearer(view: bpy.types.RegionView3D) -> Matrix:
-    """What moves all a little toward the eye, to the same place on the screen."""
+def nearer(view: bpy.types.RegionView3D, share: float) -> Matrix:
+    """What moves all by a share of its distance toward the eye, to the same place on the screen."""
     if view.is_perspective:
-        return Matrix.Scale(NEARER, 4)
-    return Matrix.Translation((0.0, 0.0, (1.0 - NEARER) * view.view_distance))
+        return Matrix.Scale(1.0 - share, 4)
+    return Matrix.Translation((0.0, 0.0, share * view.view_distance))
 
 
 def draw(curves: Curves, rim: tuple[float, ...], has_contours: bool, has_directions: bool) -> None:
@@ -79,8 +80,7 @@ def draw(curves: Curves, rim: tuple[float, ...], has_contours: bool, has_directi
     _draw_lines([(np.asarray(path, dtype=float).tobytes(), color) for path, color in lines])
     gpu.state.point_size_set(STROKE * scale)
     for path in curves.get("strokes", ()) if has_contours else ():
-        points = np.reshape(path, (-1, 3)).tolist()
-        draw_shape("POINTS", "POINT_UNIFORM_COLOR", {"pos": points}, color=BLACK)
+        draw_shape("POINTS", "POINT_UNIFORM_COLOR", {"pos": np.reshape(path, (-1, 3)).tolist()}, color=BLACK)
 
 
 def _draw_lines(lines: Sequence[tuple[bytes, tuple[float, ...]]]) -> None:
@@ -104,8 +104,7 @@ def _batch(lines: tuple[tuple[bytes, tuple[float, ...]], ...], is_outline: bool)
     """The segments of lines, in their colors or dark."""
     pieces = [np.repeat(np.frombuffer(raw).reshape(-1, 3), 2, axis=0)[1:-1] for raw, _ in lines]
     shades = np.repeat([DARK if is_outline else color for _, color in lines], list(map(len, pieces)), axis=0)
-    columns = {"pos": np.vstack(pieces).tolist(), "color": shades.tolist()}
-    return batch_for_shader(_shader(), "LINES", columns)
+    return batch_for_shader(_shader(), "LINES", {"pos": np.vstack(pieces).tolist(), "color": shades.tolist()})
 
 
 def draw_shape(kind: Any, shader_name: str, columns: dict[str, Any], **uniform: Any) -> None:
@@ -123,10 +122,11 @@ def draw_letters() -> None:
     context = bpy.context
     scale = context.preferences.system.ui_scale
     for obj in _shown_patches(context):
-        for path, text in zip(obj[CURVES]["directions"], ("κ1", "κ2"), strict=True):
-            end = obj.matrix_world @ Vector(path[-3:])
-            at = location_3d_to_region_2d(context.region, context.region_data, end)
-            if obj.tactile_directions and at is not None:
+        ends = [obj.matrix_world @ Vector(path[-3:]) for path in obj[CURVES]["directions"]]
+        places = [location_3d_to_region_2d(context.region, context.region_data, end) for end in ends]
+        is_clear = None not in places and (places[0] - places[1]).length > APART * LETTER * scale
+        for at, text in zip(places, ("κ1", "κ2"), strict=True):
+            if obj.tactile_directions and is_clear:
                 blf.size(FONT, LETTER * scale)
                 blf.color(FONT, *WHITE)
                 blf.position(FONT, at.x + 4.0 * scale, at.y, 0.0)

@@ -6,11 +6,13 @@ import math
 from typing import Any
 
 import bpy
+import numpy as np
 from bpy.props import EnumProperty, IntProperty
 from mathutils import Matrix, Vector
 from mathutils.geometry import intersect_line_plane
 
 from ..probes import anchor, probe, touch_again
+from ..scene.curves import CURVES
 from ..touch import units
 from ..touch.settings import MOST_PLANES, STEEPEST
 from ..touch.surface import MeshSurface
@@ -69,9 +71,12 @@ class TACTILE_OT_drag(bpy.types.Operator):
         if self.what in (DRAG_TURN, DRAG_TILT):
             found.tactile_probe.active_plane = self.plane
         self._matrix = found.matrix_world.copy()
+        self._center = self._matrix.translation
         # The handle follows the mouse from here on. Where the button went down is not known, because a busy
         # Blender hears of it late, when the mouse is already elsewhere.
         self._before = self._value = self._free = self._last = self._get(context)
+        if self.what == DRAG_EXTENT:
+            self._center, self._last = ring_of(probe.patch_of(found))
         below = None if self.what == POINT else self._below(context, event)
         if self.what != POINT and below is None:
             self.report({"WARNING"}, "The plane is seen edge on: turn the view to drag this handle")
@@ -139,7 +144,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
     def _below(self, context: bpy.types.Context, event: bpy.types.Event) -> float | None:
         """The angle of the mouse, or its distance from the point; None on the point and edge-on."""
         origin, direction = mouse_ray(context.region, context.region_data, event)
-        center, normal = self._matrix.translation, self._matrix.col[2].xyz.normalized()
+        center, normal = self._center, self._matrix.col[2].xyz.normalized()
         e1 = self._matrix.col[0].xyz.normalized()
         right, up = e1, normal.cross(e1)
         if self.what == DRAG_TILT:
@@ -193,6 +198,13 @@ class TACTILE_OT_drag(bpy.types.Operator):
         found = probe.probe_of(context.object)
         if found.tactile_probe.live:
             touch_again.refresh(found, context)
+
+
+def ring_of(patch: Object) -> tuple[Vector, float]:
+    """Middle and radius of the ring of the extent, which is as high and as far out as curves end."""
+    ends = np.concatenate([np.reshape(path, (-1, 3))[[0, -1]] for path in patch[CURVES]["contours"]])
+    middle = patch.matrix_world @ Vector((0.0, 0.0, float(np.median(ends[:, 2]))))
+    return middle, float(np.median(np.hypot(*ends[:, :2].T)))
 
 
 def shown_probe(context: bpy.types.Context) -> Object | None:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The handles of the active probe: they move its point, turn and tilt sampling planes, and set the extent."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import bpy
@@ -14,7 +14,7 @@ from ..probes import probe
 from ..scene.curves import CURVES
 from ..touch.touch_object import plane_axes
 from .curves import PLANE_COLORS
-from .drag import DRAG_EXTENT, DRAG_TILT, DRAG_TURN, POINT, STEEP, shown_probe
+from .drag import DRAG_EXTENT, DRAG_TILT, DRAG_TURN, POINT, STEEP, ring_of, shown_probe
 from .free_view import is_free
 from .mouse import line_of_sight
 
@@ -74,13 +74,13 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         settings, matrix = obj.tactile_probe, obj.matrix_world
         reach = settings.extent or probe.record_of(obj)["extent"]
         center = matrix.translation
-        apart = self._shrink(context, center, reach)
+        self._shrink(context, center, reach)
         active = min(settings.active_plane, settings.plane_count - 1)
         self.point.matrix_basis = Matrix.Translation(center)
         self.point.hide = settings.target is None
         patch = probe.patch_of(obj)
-        paths = [np.reshape(path, (-1, 3)) for path in patch[CURVES]["contours"]]
-        lines = [[patch.matrix_world @ Vector(p) for p in path] for path in paths]
+        paths = patch[CURVES]["contours"]
+        lines = [[patch.matrix_world @ Vector(p) for p in np.reshape(path, (-1, 3))] for path in paths]
         handles = list(zip(self.turns[: settings.plane_count], lines, strict=False))
         t, up = (Vector(axis) for axis in plane_axes(matrix, settings, active).T.tolist()[:2])
         # If the tilt's plane is seen edge on, a little way of the mouse turns it by much.
@@ -92,9 +92,12 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         taken: list[Any] = []
         for each, line in handles:
             self._put(context, each, line, taken)
-            each.hide = not apart(each.matrix_basis.translation)
-        self.extent.hide = not apart(center + reach * _right(context))
-        self.extent.matrix_basis = Matrix.LocRotScale(center, matrix.to_quaternion(), [reach] * 3)
+            each.hide = not _are_apart(context, center, each.matrix_basis.translation)
+        middle, wide = ring_of(patch)
+        self.extent.hide = not _are_apart(context, center, middle + wide * _right(context))
+        self.extent.matrix_basis = Matrix.LocRotScale(
+            middle[:], patch.matrix_world.to_quaternion(), [wide] * 3
+        )
 
     def _put(self, context: bpy.types.Context, handle: Any, line: list[Any], taken: list[Any]) -> None:
         """Puts a handle on a line, as far out as the view is free, or if it is nowhere, on its end.
@@ -116,30 +119,28 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         handle.matrix_basis = Matrix.Translation(place)
         taken += filter(None, [_seen(context, place)])
 
-    def _shrink(self, context: bpy.types.Context, center: Vector, reach: float) -> Callable[[Vector], bool]:
-        """Makes the balls smaller if the patch is small in the view, so that they do not hide it.
-
-        Returns a function that is true where a place is apart from the center in the view.
-        """
+    def _shrink(self, context: bpy.types.Context, center: Vector, reach: float) -> None:
+        """Makes the balls smaller if the patch is small in the view, so that they do not hide it."""
         here, there = _seen(context, center), _seen(context, center + reach * _right(context))
         if here is None or there is None:
-            return lambda place: True
+            return
         ui_scale = context.preferences.system.ui_scale
         gizmo = context.preferences.view.gizmo_size * ui_scale
         scale = min(max(SHARE * (there - here).length / gizmo, LEAST_BALL), BALL)
         for ball in (self.point, *self.turns, *self.tilts):
             ball.scale_basis = scale
 
-        def is_apart(place: Vector) -> bool:
-            at = _seen(context, place)
-            return at is None or (at - here).length >= APART * ui_scale
-
-        return is_apart
-
 
 def _seen(context: bpy.types.Context, place: Vector) -> Any:
     """Where a place of the world is in the region, or None if it is behind the eye."""
     return location_3d_to_region_2d(context.region, context.region_data, place)
+
+
+def _are_apart(context: bpy.types.Context, place: Vector, other: Vector) -> bool:
+    """Whether two places of the world are not close to each other in the region, if both are there."""
+    here, there = _seen(context, place), _seen(context, other)
+    near = APART * context.preferences.system.ui_scale
+    return here is None or there is None or (there - here).length >= near
 
 
 def _right(context: bpy.types.Context) -> Vector:

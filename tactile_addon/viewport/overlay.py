@@ -18,7 +18,6 @@ from ..stability_map import map_object
 from ..touch import units
 from ..touch.touch_object import plane_axes
 from ..touch.types import Object
-from ..touch.units import Unit
 from .above import draw_above
 from .curves import FONT, PLANE_COLORS, WHITE, draw_curves, draw_letters, draw_preview, draw_shape
 from .drag import DRAG_TILT, DRAG_TURN
@@ -101,13 +100,12 @@ def draw_legend() -> None:
         low = 0.0 if shown in patch_record.POSITIVE else -1.0
         title = patch.bl_rna.properties["tactile_colors"].enum_items[shown].name
         power = patch_record.POWERS[shown]
-        bar = _scale(title, record, units.unit_of_report(context.scene, record), power, low)
+        bar = _scale(title, record, power, low)
         _draw_box(context, *bar, [("Unknown", colors.UNKNOWN)] if record.get("is_gray") else ())
     elif obj is not None and patch_record.MAP_RECORD in obj and obj.visible_get():
         record, shown = obj[patch_record.MAP_RECORD], obj.tactile_map_colors
         title = obj.bl_rna.properties["tactile_map_colors"].enum_items[shown].name
-        unit = units.unit_of_report(context.scene, record)
-        bar = _scale(title, record, unit, map_object.MAP_POWERS[shown], 0.0)
+        bar = _scale(title, record, map_object.MAP_POWERS[shown], 0.0)
         if shown == REASON:
             bar = title, 0.0, []
         elif shown in map_object.REVERSED:
@@ -129,9 +127,10 @@ def _is_last_view(context: bpy.types.Context) -> bool:
 
 
 def _scale(
-    title: str, record: Mapping[str, Any], unit: Unit, power: int, low: float
+    title: str, record: Mapping[str, Any], power: int, low: float
 ) -> tuple[str, float, list[tuple[float, str]]]:
     """The title with its unit, the share at which colors begin, and the (share, text) labels of a scale."""
+    unit = units.unit_of_report(record)
     symbol = units.symbol(power, unit)
     top = record["color_limit"] / unit[1] ** power
     labels = [(at, f"{at * top:.3g}") for at in (low, 0.5 * (low + 1.0), 1.0)]
@@ -222,5 +221,4 @@ PICK_DRAWINGS = ((draw_preview, "POST_VIEW"), (draw_key, "POST_PIXEL"))
 
 def add_drawings(drawings: Iterable[tuple[Callable[..., None], str]], *given: Any) -> list[Any]:
     """Adds drawings to all 3D viewports, and returns the handles by which to remove them."""
-    add = bpy.types.SpaceView3D.draw_handler_add
-    return [add(draw, given, "WINDOW", kind) for draw, kind in drawings]
+    return [bpy.types.SpaceView3D.draw_handler_add(draw, given, "WINDOW", kind) for draw, kind in drawings]

@@ -19,7 +19,6 @@ from ..probes.operators import (
 from ..scene import patch_record
 from ..scene.viewports import show_colors, show_size
 from ..stability_map.map_object import inputs_of, touched_near
-from ..touch import units
 from ..touch.settings import (
     NAMES,
     UNSAVED,
@@ -163,8 +162,7 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         show_colors(context.space_data)
         show_size(touched.surface.size)
         report = probe.record_of(found)
-        unit = units.unit_of_report(context.scene, report)
-        return report_done(self, verdict(report, unit), report["status"] == "ok")
+        return report_done(self, verdict(report), report["status"] == "ok")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
@@ -213,10 +211,9 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
                 depsgraph = context.evaluated_depsgraph_get()
                 touched = touch(obj, depsgraph, location, toward=eye, **touch_arguments(self))
                 self._seen["touched"] = touched
-                unit = units.unit_of_report(context.scene, touched.report)
                 is_sure = touched.report["status"] == "ok"
-                bends = f"principal curvatures {curvatures(touched.report, unit)}"
-                words = short = f"{obj.name}: {bends if is_sure else verdict(touched.report, unit)}"
+                bends = f"principal curvatures {curvatures(touched.report)}"
+                words = short = f"{obj.name}: {bends if is_sure else verdict(touched.report)}"
         except ValueError as error:
             words = self._seen["refusal"] = sentence(error)
             short = "No touch is possible here"

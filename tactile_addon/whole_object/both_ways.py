@@ -3,8 +3,8 @@
 """How far a surface is off the mesh that was touched, and back, all over their faces; and why that is."""
 
 import math
-from collections.abc import Callable, Generator, Iterator
-from typing import TypeAlias
+from collections.abc import Callable, Generator, Iterator, Mapping
+from typing import Any, TypeAlias
 
 import numpy as np
 from mathutils.bvhtree import BVHTree
@@ -14,7 +14,7 @@ from ...core.steps import part_of
 from ...core.triangles import middles_of_parts, normalized, triangle_cross
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Array, Point
-from ..touch.units import Unit, length
+from ..touch.units import say_of
 
 PLACES, SEED = 10_000, 0  # The number of places on the faces of each, and the most vertices, to compare.
 STARTS = 24  # From so many of them the farthest place of all is looked for, as in `_climb`,
@@ -164,21 +164,24 @@ class BothWays:
 
 def room(surface: DetachedMesh, place: Array, way: Array) -> float:
     """How far the next wall is from a place of the mesh along a direction; inf if there is none."""
-    start = (place + LIFT * surface.size * way).tolist()
-    hit = surface.ray_cast(start, way.tolist(), 2.0 * surface.size)
+    hit = surface.ray_cast((place + LIFT * surface.size * way).tolist(), way.tolist(), 2.0 * surface.size)
     return math.inf if hit is None else math.dist(hit[0], place)
 
 
 def why_far(
-    surface: DetachedMesh, place: Array, off: float, patch: core.Reconstruction | None, unit: Unit
+    surface: DetachedMesh,
+    place: Array,
+    off: float,
+    patch: core.Reconstruction | None,
+    report: Mapping[str, Any],
 ) -> core.Doubt | None:
     """The doubt about a place (3,) where mesh and surface are `off` apart; None without a cause.
 
-    patch : what was felt nearest to the place, if anything was
+    patch : what was felt nearest to the place, if anything was; report : whose unit lengths have
     """
     foot, normal = (np.array(vector) for vector in surface.project(place.tolist())[:2])
     narrow = narrowest(surface, foot, normal)
-    words = length(off, unit), length(narrow, unit)
+    words = say_of(report, off), say_of(report, narrow)
     if surface.open_edge_distance(place) <= off:
         code = "open_edges"
     elif narrow <= THIN_SHARE * surface.size:

@@ -44,23 +44,18 @@ JOINING, MESHING = 3.3, 60.0
 # thinner by the second one have no shorter edges.
 THIN, THINNEST = 16.0, 133.0
 # The ObjectTouches of the last surface by the session_uid of its object; one at most.
-_kept: dict[int, ObjectTouches] = {}
+kept: dict[int, ObjectTouches] = {}
 
 
 def keep(obj: Object, touches: ObjectTouches) -> None:
     """Keeps the touches that made an object, so that its mesh can be made again without new touches."""
-    forget()
-    _kept[obj.session_uid] = touches
+    kept.clear()
+    kept[obj.session_uid] = touches
 
 
 def touches_of(obj: Object | None) -> ObjectTouches | None:
     """The ObjectTouches that made an object, or None if they are no longer there."""
-    return None if obj is None else _kept.get(obj.session_uid)
-
-
-def forget() -> None:
-    """Forgets the touches that are kept."""
-    _kept.clear()
+    return None if obj is None else kept.get(obj.session_uid)
 
 
 class WithTouches(InSlices):
@@ -110,39 +105,6 @@ class Growing(WithTouches):
         if self._growing is not None:
             self._growing.remove()
             self._growing = None
-
-
-class Expected:
-    """What is expected of an object, whose mesh is kept until the object changes."""
-
-    def __init__(self) -> None:
-        self._shape: tuple[int, int] | None = None
-        self._mesh: DetachedMesh | None = None
-        self.is_faceted = False  # Whether touches would feel the facets of the object one by one.
-        self.warnings: list[str] = []
-
-    def words(
-        self, target: Object, context: bpy.types.Context, tolerance: float, accuracy: str, noise: float
-    ) -> str:
-        """A sentence on the tolerance, the touches and the seconds of an object that will be touched.
-
-        Raises ValueError, with a sentence, for an object that cannot be touched.
-        """
-        depsgraph = context.evaluated_depsgraph_get()
-        vertices = target.evaluated_get(depsgraph).data.vertices if target.type == "MESH" else ()
-        shape = target.session_uid, len(vertices)
-        if shape != self._shape:
-            self._mesh = DetachedMesh(target, depsgraph)
-            self._shape = shape
-        tolerance = tolerance or tolerance_of(self._mesh.size, accuracy, noise)
-        touches, seconds, share, wall = expected(self._mesh, tolerance, noise)
-        self.is_faceted = share >= FACETED
-        self.warnings = ["Touches will feel its facets one by one"] if self.is_faceted else []
-        if wall < THIN_SHARE:
-            self.warnings.append(f"Walls of {100.0 * wall:.2g} % of its size may be bridged or pierced")
-        about = f"{many(touches, 'touch', 'touches')}, {units.duration(seconds)}"
-        unit = units.unit_of_report(context.scene, {"size": self._mesh.size})  # as the panel has
-        return f"Tolerance {units.length(tolerance, unit)}: about {about}"
 
 
 def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, float, float, float]:
@@ -206,8 +168,11 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
     )
     edge: EDGE
 
-    shown = ("target", "accuracy", "tolerance", "edge", "most", "noise", "seed")
-    _expected = None
+    shown = ("target", "accuracy", "tolerance", "edge", "noise")
+    _mesh: DetachedMesh
+    _shape: tuple[int, int] | None = None  # What it is of: the object and the number of its vertices.
+    _warnings: list[str]
+    _is_faceted = False  # Whether touches would feel the facets of the object one by one.
 
     def _begin(self, context: bpy.types.Context) -> None:
         target, found = target_object(context, self.target), probe.probe_of(context.view_layer.objects.active)
@@ -234,15 +199,24 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
         return report_done(self, object_summary(record), record["status"] == "ok")
 
     def _estimate(self, context: bpy.types.Context, target: Object) -> str:
-        """What it will take, in a sentence."""
-        self._expected = self._expected or Expected()
-        return self._expected.words(target, context, self.tolerance, self.accuracy, self.noise)
+        """A sentence on the tolerance, the touches and the seconds. The mesh is kept until it changes."""
+        depsgraph = context.evaluated_depsgraph_get()
+        vertices = target.evaluated_get(depsgraph).data.vertices if target.type == "MESH" else ()
+        if (target.session_uid, len(vertices)) != self._shape:
+            self._mesh, self._shape = DetachedMesh(target, depsgraph), (target.session_uid, len(vertices))
+        tolerance = self.tolerance or tolerance_of(self._mesh.size, self.accuracy, self.noise)
+        touches, seconds, share, wall = expected(self._mesh, tolerance, self.noise)
+        self._is_faceted = share >= FACETED
+        self._warnings = ["Touches will feel its facets one by one"] * self._is_faceted
+        if wall < THIN_SHARE:
+            self._warnings.append(f"Walls of {100.0 * wall:.2g} % of its size may be bridged or pierced")
+        words = units.say_of({"size": self._mesh.size}, tolerance)  # in the unit that the panel has
+        return f"Tolerance {words}: about {many(touches, 'touch', 'touches')}, {units.duration(seconds)}"
 
     def draw(self, context: bpy.types.Context) -> None:
         super().draw(context)
-        layout = self.layout
-        for warning in self._expected.warnings if self._expected else ():
-            layout.label(text=warning, icon="ERROR")
-        if self._expected is not None and self._expected.is_faceted:
-            button = layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
-            button.target = self.target
+        for warning in self._warnings if self._shape else ():
+            self.layout.label(text=warning, icon="ERROR")
+        if self._is_faceted:
+            idname = TACTILE_OT_add_subdivision.bl_idname
+            self.layout.operator(idname, icon="MOD_SUBSURF").target = self.target

@@ -6,27 +6,19 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import bpy
-import numpy as np
-
 from ...core.arguments import many
 from ..touch import units
-from ..touch.wording import vector
+from ..touch.wording import place, reasons
 
 # A surface is good if this share of it is within the tolerance of the mesh, and all within so many.
 WITHIN_SHARE, OFF_TOLERANCES = 0.99, 3.0
 FACETED = 0.5  # The panel says that curvatures are those of facets from this share of the area on.
 
 
-def unit_of(record: Mapping[str, Any]) -> units.Unit:
-    """The unit of a report in the open scene."""
-    return units.unit_of_report(bpy.context.scene, record)
-
-
 def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(label, value) of everything there is to say of a whole object."""
-    unit, off = unit_of(record), deviation(record, "mean")
-    was_touched = "touches" in record
+    off, was_touched = deviation(record, "mean"), "touches" in record
+    unknown = record.get("unknown_curvatures") or None
     how = many(record["touches"], "time", "times") if was_touched else _contacts(record)
     vertices = many(record["vertices"], "vertex", "vertices")
     triangles = many(record["triangles"], "triangle", "triangles")
@@ -40,11 +32,11 @@ def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("patches", f"{record['patches']}, of which {record['in_doubt']} alone would be in doubt"),
         ("edges of their graph", record["edges"]),
         ("tolerance", _length(record, "tolerance")),
-        ("standard deviation of the height", units.say(record["height_std"], 1, unit)),
+        ("standard deviation of the height", units.say_of(record, record["height_std"])),
         ("distance from the mesh", off and f"mean {off}; largest {deviation(record, 'max')}"),
-        ("largest distance at", _place(record)),
+        ("largest distance at", place(record["deviation_place"], record) if off else None),
         ("surface's mesh", f"{vertices}, {triangles}, edges {_length(record, 'edge')}"),
-        ("curvatures", _unknown(record)),
+        ("curvatures", unknown and f"unknown at {many(unknown, 'vertex', 'vertices')} beside edges and rims"),
     )
 
 
@@ -56,8 +48,20 @@ def verdict_of(record: Mapping[str, Any]) -> str:
 
 
 def object_verdict(record: Mapping[str, Any]) -> str:
-    """The verdict and what it rests on, for the panel."""
-    return " ".join(filter(None, (f"{verdict_of(record)}.", record["message"], agreement(record))))
+    """A sentence on whether a whole object is good, and what to do if it is not, as of a patch."""
+    if record["status"] == "outdated":
+        return "Outdated: touch it all over again"
+    if record["doubts"]:
+        return f"{verdict_of(record)}: {record['doubts'][0]['advice']}"
+    if "within" not in record:
+        return f"Good: heights to ± {units.say_of(record, record['height_std'])}"
+    share = within(record["within"], record["deviation_max"] <= record["tolerance"])
+    return f"Good: {share.lower()} of it is within {units.say_of(record, record['tolerance'])} of the mesh"
+
+
+def object_reasons(record: Mapping[str, Any]) -> list[str]:
+    """Sentences on what the verdict rests on."""
+    return [*reasons(record), *filter(None, [agreement(record)])]
 
 
 def is_all_within(record: Mapping[str, Any]) -> bool:
@@ -72,13 +76,13 @@ def agreement(record: Mapping[str, Any]) -> str | None:
     """
     if "within" not in record or record["uncovered"] or record["status"] == "outdated":
         return None
-    unit, tolerance = unit_of(record), record["tolerance"]
+    tolerance = record["tolerance"]
     share = within(record["within"], record["deviation_max"] <= tolerance)
     return (
-        f"{share} of the surface is within the tolerance of {units.say(tolerance, 1, unit)}, and the "
+        f"{share} of the surface is within the tolerance of {units.say_of(record, tolerance)}, and the "
         f"farthest place is {deviation(record, 'max')} off. "
         f"Good means at least {100.0 * WITHIN_SHARE:g} % within it, and none farther off than "
-        f"{units.say(OFF_TOLERANCES * tolerance, 1, unit)}."
+        f"{units.say_of(record, OFF_TOLERANCES * tolerance)}."
     )
 
 
@@ -102,7 +106,7 @@ def object_summary(record: Mapping[str, Any]) -> str:
         off = "" if record["uncovered"] else f"; {off} off the mesh on average"
         return f"{verdict_of(record)}: {touches}; {_surface(record)}{off}"
     patches = f"{many(record['patches'], 'patch', 'patches')} of {_contacts(record)}"
-    height = units.say(record["height_std"], 1, unit_of(record))
+    height = units.say_of(record, record["height_std"])
     return f"{verdict_of(record)}: {patches}; {_surface(record)}; ± {height}"
 
 
@@ -115,7 +119,7 @@ def object_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("Surface", "Closed" if record["is_closed"] else "Incomplete" if record.get("uncovered") else "Open"),
         ("Felt", within(record["felt"], False) if record.get("uncovered") else None),
         ("Tolerance", _length(record, "tolerance")),
-        ("Height", f"± {units.say(record['height_std'], 1, unit_of(record))}"),
+        ("Height", f"± {units.say_of(record, record['height_std'])}"),
         # Where touches could go on, most of it would be the object that was not felt.
         ("Deviation", None if record.get("uncovered") else deviation(record, "mean")),
         ("Patches", record["patches"]),
@@ -142,15 +146,9 @@ def _surface(record: Mapping[str, Any]) -> str:
     return "open where the object ends" if record["status"] == "ok" else "open where nothing was felt"
 
 
-def _unknown(record: Mapping[str, Any]) -> str | None:
-    """Where the curvatures are unknown, in words, or None if they are known all over."""
-    count = record.get("unknown_curvatures")
-    return f"unknown at {many(count, 'vertex', 'vertices')} beside edges and rims" if count else None
-
-
 def _length(record: Mapping[str, Any], key: str) -> str | None:
     """A length of the report in words, or None if it has none: measured contacts may choose the tolerance."""
-    return units.say(record[key], 1, unit_of(record)) if record.get(key) else None
+    return units.say_of(record, record[key]) if record.get(key) else None
 
 
 def deviation(record: Mapping[str, Any], what: str) -> str | None:
@@ -158,12 +156,4 @@ def deviation(record: Mapping[str, Any], what: str) -> str | None:
     off = record.get(f"deviation_{what}")
     if off is None:
         return None
-    return units.say(units.rounded(off, 1, record["size"]), 1, unit_of(record))
-
-
-def _place(record: Mapping[str, Any]) -> str | None:
-    """Where in the world the surface and the mesh are farthest apart, or None if that is unknown."""
-    if "deviation_place" not in record:
-        return None
-    name, size = unit_of(record)
-    return f"{vector(np.divide(record['deviation_place'], size))} {name}".rstrip()
+    return units.say_of(record, units.rounded(off, 1, record["size"]))

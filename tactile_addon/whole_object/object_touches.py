@@ -16,9 +16,9 @@ from ..touch.detached_mesh import DetachedMesh
 from ..touch.touch_object import AWAY, nearest_point
 from ..touch.touch_report import verdict_report
 from ..touch.types import Array, Object
-from ..touch.units import Unit, length
+from ..touch.units import length, say_of
 from .both_ways import BothWays, narrowest, why_far
-from .object_report import OFF_TOLERANCES, WITHIN_SHARE, unit_of, within
+from .object_report import OFF_TOLERANCES, WITHIN_SHARE, within
 from .whole_surface import WholeSurface
 
 # These lengths are shares of the object's size.
@@ -256,32 +256,32 @@ class ObjectTouches:
 
     def _doubts(self, found: Mapping[str, Any]) -> list[core.Doubt]:
         """The doubts of its atlas, and what the mesh adds to these, the gravest first."""
-        doubts, unit = self.whole.doubts(), unit_of(found)
+        doubts = self.whole.doubts()
         off, farthest = self.compared.largest, OFF_TOLERANCES * self.tolerance
         if count := found["uncovered"]:
-            words = within(found["felt"], False), length(off, unit)
+            words = within(found["felt"], False), say_of(found, off)
             code = "stopped" if self.whole.atlas.is_cut_short else "out_of_reach"
             others = (doubt for doubt in doubts if doubt.code not in ("cut_short", "goes_on"))
             return [core.Doubt(code, count, words=words), *others]
         useless = (core.FINER,) if self.edge else (core.SHORTER_EDGES,)
         if off > farthest:
-            if not (self.edge and not doubts) and (why := self._why_far(unit)):
+            if not (self.edge and not doubts) and (why := self._why_far(found)):
                 return [why, *doubts]
-            return [*doubts, core.Doubt("off_mesh", off, farthest, (length(off, unit),), useless)]
+            return [*doubts, core.Doubt("off_mesh", off, farthest, (say_of(found, off),), useless)]
         if self.compared.within < WITHIN_SHARE:
             share = (within(self.compared.within, False),)
             doubts.append(core.Doubt("share", self.compared.within, WITHIN_SHARE, share, useless))
         if found["height_std"] > self.tolerance:
-            lengths = length(found["height_std"], unit), length(self.tolerance, unit)
+            lengths = say_of(found, found["height_std"]), say_of(found, self.tolerance)
             doubts.append(core.Doubt("mean_height", found["height_std"], self.tolerance, lengths))
         return doubts
 
-    def _why_far(self, unit: Unit) -> core.Doubt | None:
+    def _why_far(self, found: Mapping[str, Any]) -> core.Doubt | None:
         """The doubt about the place where surface and mesh are farthest apart, as `why_far` has it."""
         place, mesh = self.compared.place, self.whole.mesh
         nearest = int(mesh.patch[np.argmin(((mesh.vertices - place) ** 2).sum(axis=1))])
         patch = self.found[nearest] if nearest >= 0 else None
-        return why_far(self.surface, place, self.compared.largest, patch, unit)
+        return why_far(self.surface, place, self.compared.largest, patch, found)
 
 
 def tolerance_of(size: float, accuracy: str, noise: float) -> float:

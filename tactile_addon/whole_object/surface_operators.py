@@ -18,7 +18,7 @@ from ..touch.settings import length_property
 from ..touch.types import Object, Outcome, Point
 from . import whole_mesh
 from .object_operator import EDGE, Growing, WithTouches, keep, touches_of
-from .object_report import deviation, object_summary, unit_of
+from .object_report import deviation, object_summary
 from .object_touches import ObjectTouches
 
 SEEN = 1.0  # The place is seen from so many sizes of the object, so that what is around it is seen, too.
@@ -68,8 +68,7 @@ class TACTILE_OT_look_farthest(bpy.types.Operator):
 
 def _select_nearest(mesh: bpy.types.Mesh, place: Point) -> Any:
     """Selects the vertex nearest to a place, and nothing else, and returns it."""
-    offsets = read_array(mesh.vertices, "co", 3) - np.array(place)
-    nearest = int(np.argmin((offsets**2).sum(axis=1)))
+    nearest = int(np.argmin(((read_array(mesh.vertices, "co", 3) - np.array(place)) ** 2).sum(axis=1)))
     for parts in (mesh.vertices, mesh.edges, mesh.polygons):
         parts.foreach_set("select", np.zeros(len(parts), dtype=bool))
     mesh.vertices[nearest].select = True
@@ -108,8 +107,7 @@ class OnSurface(WithTouches):
         report = self._touches.report() | {"source": obj[patch_record.ATLAS_RECORD]["source"]}
         whole_mesh.rewrite(obj, self._touches.whole, report)
         keep(obj, self._touches)
-        record: dict[str, Any] = obj[patch_record.ATLAS_RECORD].to_dict()
-        return record
+        return obj[patch_record.ATLAS_RECORD].to_dict()
 
 
 class TACTILE_OT_mesh_again(OnSurface, bpy.types.Operator):
@@ -139,7 +137,7 @@ class TACTILE_OT_mesh_again(OnSurface, bpy.types.Operator):
         record = self._rewrite(context)
         summary = object_summary(record)
         if self.edge > self._touches.whole.atlas.longest_edge():
-            summary += f"; edges are {units.length(record['edge'], unit_of(record))} long, as thin walls need"
+            summary += f"; edges are {units.say_of(record, record['edge'])} long, as thin walls need"
         return report_done(self, summary)
 
 

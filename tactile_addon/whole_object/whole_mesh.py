@@ -35,12 +35,14 @@ SHARP = math.radians(30.0)  # Edges at which faces are turned by more are crease
 # rim, and spokes.
 RINGS, SPOKES = (0.25, 0.5, 0.75, 0.95, 1.0), 48
 RIM_COLOR = (0.15, 0.15, 0.15, 1.0)
-# It is drawn no lower than the mesh, and above that by one to four times this share of the object's size, or
-# of its own if that is less: overlapping patches at one height would flicker, and multiples of the golden
-# section are far apart from those before them.
+# It is above its place by one to four times this share of the object's size, or of its own if that is less:
+# overlapping patches at one height would flicker. Multiples of the golden section are far apart from those
+# before them.
 LAYER, OWN_LAYER, LAYERS = 6e-4, 2e-2, 3
 GOLDEN_SECTION = 0.5 * (math.sqrt(5.0) - 1.0)
-DRAWN_ABOVE = 5e-3  # That of the whole surface where it is not drawn in front, as a share of its size.
+# The whole surface, where it is not drawn in front, is drawn above the mesh by this share of the size, and
+# patches by twice as much, because their rims and straight edges may be below the mesh.
+DRAWN_ABOVE = 5e-3
 
 
 class GrowingPatches:
@@ -58,7 +60,8 @@ class GrowingPatches:
         obj.data.materials.append(emission("Tactile Surface", COLOR))
         self._patches: list[tuple[Array, Array]] = []
         self._bends: list[tuple[float, float]] = []  # The larger principal curvature of each, and its area.
-        self._uid, self._size, self._surface = obj.session_uid, surface.size, surface
+        obj[ABOVE] = 2.0 * DRAWN_ABOVE * surface.size
+        self._uid, self._size = obj.session_uid, surface.size
         show_colors()
         show_size(surface.size)
 
@@ -68,13 +71,11 @@ class GrowingPatches:
         if obj is None or not found:
             return
         for r, rim in zip(found, rims, strict=True):
-            points, normals, mean_curvature = _disk(r, rim)
+            points, mean_curvature = _disk(r, rim)
             layer = min(LAYER * self._size, OWN_LAYER * float(np.median(rim)))
             layer *= 1.0 + LAYERS * (GOLDEN_SECTION * len(self._patches) % 1.0)
-            above = _below(self._surface, points, normals) + layer
-            self._patches.append((points + above[:, None] * normals, mean_curvature))
-            certain = max(abs(r.k1) - r.k1_std, abs(r.k2) - r.k2_std, 0.0)
-            self._bends.append((certain, np.mean(rim**2)))
+            self._patches.append((points + layer * r.frame.axes[:, 2], mean_curvature))
+            self._bends.append((max(abs(r.k1) - r.k1_std, abs(r.k2) - r.k2_std, 0.0), np.mean(rim**2)))
         points, mean_curvatures = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
         count = 1 + SPOKES * len(RINGS)
         triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
@@ -93,30 +94,18 @@ class GrowingPatches:
         return next((obj for obj in bpy.data.objects if obj.session_uid == self._uid), None)
 
 
-def _disk(r: core.Reconstruction, rim: Array) -> tuple[Array, Array, Array]:
-    """Points (n, 3) of a patch, on rings around its middle, normals, and what is certain of mean curvatures.
+def _disk(r: core.Reconstruction, rim: Array) -> tuple[Array, Array]:
+    """Points (n, 3) of a patch, on rings around its middle, and what is certain of mean curvatures there.
 
     rim : (k SPOKES,), the radii of the patch all round, where the finger felt it end
     """
     angles = np.linspace(0.0, 2.0 * np.pi, SPOKES, endpoint=False)
     edge = rim[:: len(rim) // SPOKES, None] * np.column_stack([np.cos(angles), np.sin(angles)])
     x, y = np.vstack([np.zeros((1, 2)), *(share * edge for share in RINGS)]).T
-    d = r.geometry.derivatives(x, y)
-    points = r.frame.to_world(np.column_stack([x, y, d.z]))
     mean_curvature = r.patch.mean_curvature(x, y)
     certain = np.maximum(np.abs(mean_curvature) - 0.5 * (r.k1_std + r.k2_std), 0.0)
-    return points, d.normal @ r.frame.axes.T, np.copysign(certain, mean_curvature)
-
-
-def _below(surface: DetachedMesh, points: Array, normals: Array) -> Array:
-    """How far a mesh is above the points of a disk, (n,), or above the middles of triangles around these."""
-    fan = _fan()
-    places = np.vstack([points, points[fan].mean(axis=1)])
-    ways = np.vstack([normals, normals[fan].mean(axis=1)])
-    heights = np.sum((surface.feet(places) - places) * ways, axis=1)
-    below, between = np.split(np.maximum(heights, 0.0), [len(points)])
-    np.maximum.at(below, fan, between[:, None])
-    return below
+    points = r.frame.to_world(np.column_stack([x, y, r.height(x, y)]))
+    return points, np.copysign(certain, mean_curvature)
 
 
 def _fan() -> Array:

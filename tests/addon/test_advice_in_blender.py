@@ -21,7 +21,7 @@ def why_far(extension, empty):
             point, normal = room.touch.touch_object.nearest_point(surface, patch_at, 1.0)
             patch = extension.core.explore(surface, point, normal, farthest=0.5).result
         place = np.subtract(place, surface.origin)
-        found = room.whole_object.both_ways.why_far(surface, place, 0.1, patch, ("m", 1.0))
+        found = room.whole_object.both_ways.why_far(surface, place, 0.1, patch, {"size": surface.size})
         return found and found.code
 
     return why_far

@@ -48,6 +48,17 @@ def test_lengths_and_angles_know_their_units(empty):
                 assert known.unit == "ROTATION"
 
 
+def test_no_dialog_has_more_than_five_fields(extension):
+    addon = extension.tactile_addon
+    operators = (
+        addon.whole_object.object_operator.TACTILE_OT_touch_all_over,
+        addon.whole_object.surface_operators.TACTILE_OT_mesh_again,
+        addon.whole_object.surface_operators.TACTILE_OT_continue_touching,
+        addon.stability_map.map_operator.TACTILE_OT_stability_map,
+    )
+    assert max(len(operator.shown) for operator in operators) <= 5
+
+
 def test_what_cannot_run_says_why(empty):
     def refused(name):
         with pytest.raises(RuntimeError) as caught:
@@ -57,6 +68,10 @@ def test_what_cannot_run_says_why(empty):
     for obj in list(empty.data.objects):
         empty.data.objects.remove(obj)
     said = "There is no mesh to touch: add one (Shift A), or import a scan (File > Import)"
+    assert refused("pick") == said
+    empty.ops.object.text_add()
+    assert refused("pick") == "Convert the text to a mesh (Object > Convert)"
+    empty.ops.object.delete()
     assert refused("pick") == said
     on_probes = ("add_plane", "add_planes", "remove_plane", "update", "delete")
     assert {refused(name) for name in on_probes} == {"Select a probe, or pick a reference point first"}

@@ -207,7 +207,7 @@ def test_the_page_of_a_map_counts_touches_by_their_area_and_no_vertices(empty, e
 def test_only_all_of_a_surface_is_100_percent(extension):
     parts = extension.tactile_addon.report.parts
     values, weights = np.array([0.0, 1.0]), np.array([9999.0, 1.0])
-    page = Page(parts.bands(values, weights, 0.5, ("mm", 1.0), [("less", 0.9), ("all", 1.5)]))
+    page = Page(parts.bands(values, weights, 0.5, {"radius": 1.0}, [("less", 0.9), ("all", 1.5)]))
     assert (band(page, "less"), band(page, "all")) == (99.9, 100.0)
 
 

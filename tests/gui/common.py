@@ -6,6 +6,7 @@ import math
 import os
 import subprocess
 from pathlib import Path
+from statistics import median
 
 import bpy
 import gui
@@ -139,6 +140,17 @@ def handle(azimuth, reach=1.0):
     e1, e2 = obj.matrix_world.col[0].xyz, obj.matrix_world.col[1].xyz
     at = math.cos(azimuth) * e1 + math.sin(azimuth) * e2
     return gui.view_point(obj.matrix_world.translation + reach * extent(obj) * at)
+
+
+def on_ring(azimuth, share=1.0):
+    """Where in the window the ring of the extent is at that azimuth, or else nearer to its middle."""
+    shown, e1, e2 = patch(), probe().matrix_world.col[0].xyz, probe().matrix_world.col[1].xyz
+    ends = [
+        Vector(path[i : i + 3]) for path in shown["tactile_curves"]["contours"] for i in (0, len(path) - 3)
+    ]
+    wide, high = median(end.xy.length for end in ends), median(end.z for end in ends)
+    at = share * wide * (math.cos(azimuth) * e1 + math.sin(azimuth) * e2)
+    return gui.view_point(shown.matrix_world @ Vector((0.0, 0.0, high)) + at)
 
 
 def consistent(when, owner=None):

@@ -15,7 +15,7 @@ from mathutils import Vector
 sys.path.insert(0, str(Path(__file__).parent))
 from common import ASIDE, check, extent, handle, is_complete, look, open_tab, patch, picture, probe, until
 
-SUBDIVIDE_BUTTON = (893, 422)
+SUBDIVIDE_BUTTON = (893, 522)
 SMALL = 0.043
 
 

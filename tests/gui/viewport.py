@@ -27,6 +27,7 @@ from common import (
     is_complete,
     last_report,
     look,
+    on_ring,
     open_tab,
     patch,
     picture,
@@ -163,7 +164,7 @@ def drag_handles():
 
     before, reach = state(), extent(probe())
     free = 0.5 * (probe().tactile_probe.azimuths[0] + probe().tactile_probe.azimuths[1]) + math.pi
-    gui.drag(handle(free, 1.0), handle(free, 0.7))
+    gui.drag(on_ring(free), on_ring(free, 0.7))
     yield 1
     yield from until(is_complete)
     ratio = probe().tactile_probe.extent / reach

@@ -120,12 +120,14 @@ def test_the_patch_of_a_probe_is_where_its_probe_is(empty, suzanne, extension):
         extension.tactile_addon.touch.wording,
     )
     found = {"target": "A", "pose": 1, "residuals": [0.1, 0.2], "is_ambiguous": False}
-    assert report.registration_summary(found) == 'The contacts are 0.1 m off "A" (root mean square)'
-    assert "are 100 mm off" in report.registration_summary(found, ("mm", 1e-3))  # as all in the panel
+    record = {"radius": 1.0, "registration": found}
+    assert report.registration_summary(record) == 'The contacts are 0.1 m off "A" (root mean square)'
+    record["radius"] = 0.001
+    assert "are 100 mm off" in report.registration_summary(record)  # as all in the panel
     patch.parent = None
     depsgraph = empty.context.evaluated_depsgraph_get()
     with pytest.raises(ValueError, match=r"The search has found 5 poses on .*: choose a lower number"):
-        registration.register_patch(patch, suzanne, depsgraph, pose=99)
+        registration.Search(patch, suzanne, depsgraph).put(99)
 
 
 def imported(bpy, suzanne, tmp_path):
@@ -180,7 +182,7 @@ def test_a_search_that_is_stopped_leaves_the_patch_and_one_that_fails_says_why(
     for _ in steps:
         pass
     assert patch.matrix_world == before
-    assert search.put(1)["target"] == suzanne.name
+    assert search.put(1)["registration"]["target"] == suzanne.name
     assert patch.matrix_world != before
 
     def full(*given, **named):
@@ -188,7 +190,7 @@ def test_a_search_that_is_stopped_leaves_the_patch_and_one_that_fails_says_why(
 
     monkeypatch.setattr(registration.core, "register", full)
     with pytest.raises(ValueError, match="is too large to be searched: remove what is far"):
-        registration.register_patch(patch, suzanne, depsgraph)
+        registration.Search(patch, suzanne, depsgraph).put()
     monkeypatch.undo()
     empty.data.objects.remove(patch)
     with pytest.raises(ValueError, match="was deleted while its place was searched for"):

@@ -138,12 +138,12 @@ def test_large_faces_contradict_a_patch_too(empty, extension):
     patch = empty.context.object
     verified(empty, patch)
     verdict = extension.tactile_addon.touch.wording.verdict
-    assert verdict(patch["tactile"], ("m", 1.0)).startswith("Good: heights to")
+    assert verdict(patch["tactile"]).startswith("Good: heights to")
     patch.location.z += 0.05
     empty.context.view_layer.update()
     assert verified(empty, patch)["vertices"] == 0
     assert patch["tactile"]["message"].startswith("The mesh is 8.33 % of the radius off the patch on average")
-    assert verdict(patch["tactile"], ("m", 1.0)).startswith("Doubtful: ")
+    assert verdict(patch["tactile"]).startswith("Doubtful: ")
 
 
 def test_a_patch_moved_off_its_mesh(empty, patch):
@@ -161,12 +161,12 @@ def test_the_scenes_unit_is_the_panels(empty, patch, extension):
     settings.system, settings.scale_length, settings.length_unit = "METRIC", 0.001, "MILLIMETERS"
     found = verified(empty, patch)
     unit = addon.touch.units.unit_of(empty.context.scene, patch["tactile"]["radius"])
-    head, *rows, points = addon.comparison.verify_operator.verification_table(patch["tactile"], unit)
+    head, *rows, points = addon.comparison.verify_operator.verification_table(patch["tactile"])
     assert head == ("in mm", "Mesh", "Contacts")
     assert [row[0] for row in rows] == ["Mean", "Median", "Maximum", "RMS"]
     assert rows[0][1] == f"{found['vertex_distance_mean']:.3g}"
     assert points == ("Points", str(found["vertices"]), "60")
-    rows = dict(addon.comparison.verify_operator.verification_rows(patch["tactile"], unit))
+    rows = dict(addon.comparison.verify_operator.verification_rows(patch["tactile"]))
     assert rows["Overlap"] == "100 %"
     farthest = np.abs(values(patch.data, "deviation")).max()
     assert rows["Largest Deviation"] == addon.touch.units.say(farthest, 1, unit)

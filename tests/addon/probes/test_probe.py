@@ -771,10 +771,10 @@ def test_the_colors_show_what_is_chosen_after_an_update_too(empty, ball, shown):
     [
         ("METRIC", "METERS", 1.0, 0.5, "0.0123 m, -4.2 1/m, 17.6 1/m²"),
         ("METRIC", "MILLIMETERS", 0.001, 8.0, "0.0123 mm, -4.2 1/mm, 17.6 1/mm²"),
-        ("METRIC", "MILLIMETERS", 1.0, 8.0, "12.3 mm, -0.0042 1/mm, 1.76e-05 1/mm²"),
+        ("METRIC", "MILLIMETERS", 1.0, 8.0, "12.3 mm, -0.0042 1/mm, 0.0000176 1/mm²"),
         ("METRIC", "ADAPTIVE", 1.0, 0.02, "1.23 cm, -0.042 1/cm, 0.00176 1/cm²"),
         ("METRIC", "ADAPTIVE", 0.001, 8.0, "0.0123 mm, -4.2 1/mm, 17.6 1/mm²"),
-        ("METRIC", "ADAPTIVE", 1.0, 1e-9, "1.23e+04 µm, -4.2e-06 1/µm, 1.76e-11 1/µm²"),
+        ("METRIC", "ADAPTIVE", 1.0, 1e-9, "1.23e+04 µm, -0.0000042 1/µm, 1.76e-11 1/µm²"),
         ("IMPERIAL", "INCHES", 1.0, 1.0, "0.484 in, -0.107 1/in, 0.0114 1/in²"),
         ("IMPERIAL", "ADAPTIVE", 1.0, 1.0, "0.0404 ft, -1.28 1/ft, 1.64 1/ft²"),
         ("NONE", "METERS", 0.001, 1.0, "0.0123, -4.2, 17.6"),
@@ -807,10 +807,8 @@ def test_the_legend_has_the_range_of_the_colors_in_the_unit_of_the_scene(
     patch.tactile_colors = shown
     record, label = report_of(patch), patch.bl_rna.properties["tactile_colors"].enum_items[shown].name
     lowest = 0.0 if shown in addon.scene.patch_record.POSITIVE else -1.0
-    unit = addon.touch.units.unit_of_report(empty.context.scene, record)
-    said, begin, labels = addon.viewport.overlay._scale(
-        label, record, unit, addon.scene.patch_record.POWERS[shown], lowest
-    )
+    power_of = addon.scene.patch_record.POWERS
+    said, begin, labels = addon.viewport.overlay._scale(label, record, power_of[shown], lowest)
     assert (said, begin) == (title, low)
     top = record["color_limit"] * 1000.0**power
     assert [at for at, _ in labels] == [low, 0.5 * (low + 1.0), 1.0]

@@ -12,17 +12,25 @@ UNIT = ("mm", 1.0)
 
 
 @pytest.fixture
-def said(extension):
+def millimeters(empty):
+    """A scene with numbers in millimeters, which it shows."""
+    settings = empty.context.scene.unit_settings
+    settings.scale_length, settings.length_unit = 0.001, "MILLIMETERS"
+    return empty
+
+
+@pytest.fixture
+def said(extension, millimeters):
     return extension.tactile_addon.sidebar.patch_rows
 
 
 @pytest.fixture
-def wording(extension):
+def wording(extension, millimeters):
     return extension.tactile_addon.touch.wording
 
 
 @pytest.fixture
-def ball(empty):
+def ball(empty, millimeters):
     """The probe of a ball of radius 1, and its report."""
     empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32)
     empty.ops.tactile.pick(location=(0.3, 0.2, 1.0))
@@ -31,24 +39,23 @@ def ball(empty):
 
 
 def record(status="ok", message="The patch describes its contacts.", **more):
-    return {"status": status, "message": message, "doubts": [], "height_std": 0.0123, **more}
+    base = {"status": status, "message": message, "doubts": [], "height_std": 0.0123, "radius": 1.0}
+    return base | {"k1": -2.0, "k1_std": 0.3, "k2": 0.0, "k2_std": 0.01} | more
 
 
-def test_a_length_far_below_its_unit_is_in_a_smaller_one(extension):
+def test_all_lengths_of_one_object_have_one_unit_without_an_exponent_where_zeros_are_few(extension):
     say = extension.tactile_addon.touch.units.say
-    assert say(8.52e-5, 1, ("m", 1.0)) == "0.0852 mm"
-    assert say(-8.52e-8, 1, ("m", 1e-3)) == "-0.0852 mm"  # A unit of the world is a kilometer.
-    assert say(8.5e-7, 1, ("cm", 0.01)) == "0.85 µm"
-    assert say(2e-5, 1, ("ft", 0.3048)) == "0.787 thou"
-    assert say(1.2e-4, 1, ("m", 1.0)) == "0.00012 m"
-    assert say(9.9e-5, 1, ("m", 1.0)) == "0.099 mm"
-    assert say(8.52e-5, 1, ("", 1.0)) == "8.52e-05"
-    assert say(3e-9, 1, ("m", 1.0)) == "3e-09 m"  # There is no smaller one.
+    lengths = (3.04e-4, 4.006e-5, 3.99e-5, -1.2345e-6, 9.9996e-5)
+    words = ["0.000304 m", "0.0000401 m", "0.0000399 m", "-0.00000123 m", "0.0001 m"]
+    assert [say(value, 1, ("m", 1.0)) for value in lengths] == words
+    assert say(-8.52e-8, 1, ("m", 1e-3)) == "-0.0000852 m"  # A unit of the world is a kilometer.
+    assert say(8.52e-5, 1, ("", 1.0)) == "0.0000852"
+    assert say(3e-9, 1, ("m", 1.0)) == "3e-09 m"
     assert say(0.0, 1, ("m", 1.0)) == "0 m"
-    assert say(8.52e-5, -1, ("m", 1.0)) == "8.52e-05 1/m"
+    assert say(8.52e-5, -1, ("m", 1.0)) == "0.0000852 1/m"
 
 
-def test_a_number_has_no_digit_beyond_the_first_one_of_its_deviation(extension):
+def test_a_number_has_no_digit_beyond_the_first_one_of_its_deviation(extension, wording):
     units = extension.tactile_addon.touch.units
     assert units.say(-0.00303, -1, UNIT, 0.0203) == "0 ± 0.02 1/mm"
     assert units.say(0.0109, -1, UNIT, 0.0098) == "0.01 ± 0.01 1/mm"
@@ -58,40 +65,58 @@ def test_a_number_has_no_digit_beyond_the_first_one_of_its_deviation(extension):
     assert units.say(0.125, 1, UNIT, 0.0) == "0.125 ± 0 mm"
     assert units.say(3.34e-7, -1, UNIT, 7e-4) == "0 ± 0.0007 1/mm"
     assert units.say(-0.002, -1, UNIT, 7e-4) == "-0.002 ± 0.0007 1/mm"
-    flat = {"k1": 2e-40, "k2": -1e-7, "k1_std": 0.01, "k2_std": 0.01}
-    assert extension.tactile_addon.touch.wording.curvatures(flat, UNIT) == "0 and 0 1/mm"
+    flat = {"k1": 2e-40, "k2": -1e-7, "k1_std": 0.01, "k2_std": 0.01, "radius": 1.0}
+    assert wording.curvatures(flat) == "0 and 0 1/mm"
+
+
+@pytest.mark.parametrize(
+    ("more", "is_uncertain"),
+    [
+        ({}, False),
+        ({"k2_std": 0.2}, True),
+        ({"k1_std": 2.1}, True),
+        ({"k1_std": 1.9}, False),
+        ({"k2_std": 0.09}, False),  # It is known to be about flat.
+        ({"k2_std": 0.09, "radius": 2.0}, True),
+        ({"k1_std": float("inf")}, True),
+    ],
+)
+def test_a_good_verdict_says_where_curvatures_are_uncertain(wording, more, is_uncertain):
+    said = wording.verdict(record(**more))
+    good = "Good: heights to ± 0.0123 mm"
+    assert said == ("Good heights, to ± 0.0123 mm; curvatures are uncertain" if is_uncertain else good)
 
 
 def test_a_flat_patch_has_no_shape_index(said, empty):
     empty.ops.mesh.primitive_cube_add()
     empty.ops.tactile.pick(target="Cube", location=(0.2, 0.1, 1.0))
     (patch,) = empty.context.object.children
-    assert dict(said.other_rows(patch["tactile"].to_dict(), UNIT))["Shape Index"] == "–"
+    assert dict(said.other_rows(patch["tactile"].to_dict()))["Shape Index"] == "–"
 
 
 def test_the_verdict_says_good_and_how_good(wording):
-    assert wording.verdict(record(), UNIT) == "Good: heights to ± 0.0123 mm"
+    assert wording.verdict(record()) == "Good: heights to ± 0.0123 mm"
     blind = record(
         message="The patch describes its contacts. These planes cannot show 3 of the 28 ways to bend."
     )
-    assert wording.verdict(blind, UNIT) == "Good: heights to ± 0.0123 mm"
+    assert wording.verdict(blind) == "Good: heights to ± 0.0123 mm"
 
 
 def test_the_reasons_say_what_limits_a_good_patch(wording, empty):
     empty.ops.mesh.primitive_cube_add()
     empty.ops.tactile.pick(target="Cube", location=(0.9, 0.2, 1.0), extent=0.5)
     (patch,) = empty.context.object.children
-    words = wording.verdict(patch["tactile"].to_dict(), UNIT)
+    words = wording.verdict(patch["tactile"].to_dict())
     assert words.startswith("Good: heights to ± ")
     (reason,) = wording.reasons(patch["tactile"].to_dict())
     assert reason.endswith(" 3 of 6 half curves ended at a crease, before the extent.")
 
 
 def test_the_deviation_at_the_rim_stands_below_the_mean(said, ball):
-    rows = dict(said.other_rows(ball[1], UNIT))
+    rows = dict(said.other_rows(ball[1]))
     mean, rim = (float(rows[key].split()[1]) for key in ("Height", "At the Rim"))
     assert 1.5 < rim / mean < 10.0
-    assert dict(said.other_rows({**ball[1], "height_std_rim": 0.04}, UNIT))["At the Rim"] == "± 0.04 mm"
+    assert dict(said.other_rows({**ball[1], "height_std_rim": 0.04}))["At the Rim"] == "± 0.04 mm"
 
 
 @pytest.mark.parametrize("status", ["uncertain", "not_converged"])
@@ -103,28 +128,27 @@ def test_the_verdict_says_what_to_do_where_there_is_doubt(wording, status):
     advice = {"heights": "use a shorter extent or add sampling planes", "gap": "add sampling planes"}
     doubts = [{"code": code, "sentence": f"The {code}", "advice": words} for code, words in advice.items()]
     found = record(status, message, doubts=doubts)
-    assert wording.verdict(found, UNIT) == "Doubtful: use a shorter extent or add sampling planes"
+    assert wording.verdict(found) == "Doubtful: use a shorter extent or add sampling planes"
     assert wording.reasons(found) == [message, "The gap: add sampling planes."]
 
 
 def test_the_verdict_on_an_earlier_patch_is_none(wording):
-    assert wording.verdict(record("outdated"), UNIT) == "Outdated: touch again"
+    assert wording.verdict(record("outdated")) == "Outdated: touch again"
 
 
-def test_what_was_found_stands_next_to_auto(said, empty, ball):
+def test_what_was_found_stands_next_to_auto(said, ball):
     _, report = ball
-    scene = empty.context.scene
-    found = said.found_values(report, scene)
+    found = said.found_values(report)
     assert found.keys() == {"extent", "step", "degree"}
     number, unit = found["extent"].split()
-    meters = {"m": 1.0, "cm": 0.01, "mm": 0.001}[unit]
+    meters = {"mm": 1.0}[unit]
     assert float(number) * meters == pytest.approx(report["extent"], rel=1e-2)
-    assert said.found_values(None, scene) == said.found_values(report | {"status": "outdated"}, scene) == {}
+    assert said.found_values(None) == said.found_values(report | {"status": "outdated"}) == {}
 
 
 def test_rows_are_distinguished_by_how_they_begin(said, ball):
     _, report = ball
-    rows = said.main_rows(report, UNIT) + said.other_rows(report, UNIT)
+    rows = said.main_rows(report) + said.other_rows(report)
     labels = [label for label, value in rows if value]  # a heading has no value
     assert len({label[:5] for label in labels}) == len(labels) == len(set(labels))
     assert max(map(len, labels)) <= 11
@@ -133,7 +157,7 @@ def test_rows_are_distinguished_by_how_they_begin(said, ball):
 def test_every_row_says_what_it_is(said, extension, ball):
     _, report = ball
     addon = extension.tactile_addon
-    rows = said.main_rows(report, UNIT) + said.other_rows(report, UNIT) + said.plane_rows(report, UNIT)
+    rows = said.main_rows(report) + said.other_rows(report) + said.plane_rows(report)
     labels = [label for label, value in rows if value] + [
         "Error on 9 More Curves",
         "Total Curvature",
@@ -170,12 +194,12 @@ def test_panels_have_the_scene_s_unit_unless_numbers_in_it_would_be_long(extensi
     assert scene.unit_settings.length_unit == "METERS"
     assert [units.unit_of(scene, size)[0] for size in (5.0, 0.05, 0.012, 0.005)] == ["m", "cm", "cm", "mm"]
     record = {"radius": 0.01, "size": 0.2, "tolerance": 2e-4, "height_std": 1e-5, "color_limit": 48.0}
-    assert extension.tactile_addon.whole_object.object_report.unit_of(record)[0] == "cm"
+    assert extension.tactile_addon.touch.units.unit_of_report(record)[0] == "cm"
     empty.ops.mesh.primitive_cube_add()
     empty.context.object["tactile_object"] = record
     for shown in ("mean_curvature", "deviation"):  # One object has one unit, whatever is shown.
         empty.context.object.tactile_colors = shown
-        assert extension.tactile_addon.scene.shown.unit_of_range(empty.context.object, scene)[1][0] == "cm"
+        assert extension.tactile_addon.scene.shown.unit_of_range(empty.context.object)[1][0] == "cm"
     record["color_limit"] = 48.0
     empty.context.object["tactile_object"] = record
     empty.context.object.tactile_colors = "mean_curvature"
@@ -203,8 +227,8 @@ class Layout:
     def panel(self, *_, **__):
         return self.part(), self.part()
 
-    def operator(self, *_, text="", **__):
-        self.drawn.append((text, not self.is_gray))
+    def operator(self, name, *_, text="", **__):
+        self.drawn.append((text or name, not self.is_gray))
         return SimpleNamespace()
 
     def prop(self, *_, **__):
@@ -223,6 +247,32 @@ def test_a_value_that_has_no_room_next_to_its_label_stands_below_it(extension, w
     layout, rows = Layout(), [("Shape Index", "0.57"), ("K", "0.00312 ± 0.002 1/mm²")]
     extension.tactile_addon.sidebar.rows.draw_rows(context, layout, rows)
     assert [text for text, _ in layout.drawn] == ["Shape Index", "0.57", *line]
+
+
+@pytest.mark.parametrize(
+    ("sentence", "lines"),
+    [
+        ("Good: heights to ± 1 mm", ["Good", "heights to ± 1 mm"]),
+        ("Doubtful: add a Subdivision modifier if so", ["Doubtful: add a Subdivision", "modifier if so"]),
+        ("Doubtful: " + 20 * "word ", ["Doubtful: word word word word", "word word word word word …"]),
+    ],
+)
+def test_a_verdict_has_two_lines_of_which_none_is_empty(extension, sentence, lines):
+    context = SimpleNamespace(
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)), region=SimpleNamespace(width=250)
+    )
+    layout = Layout()
+    extension.tactile_addon.sidebar.rows.draw_sentence(context, layout, sentence, "INFO", in_two=True)
+    assert [text for text, _ in layout.drawn] == lines
+
+
+def test_the_button_that_helps_is_below_the_curvatures(extension, empty):
+    empty.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
+    empty.ops.tactile.pick(location=(0.6, -0.6, 0.6))
+    record = empty.context.object.children[0]["tactile"]
+    assert {doubt["code"] for doubt in record["doubts"]} & {"facets", "folds"}
+    names = [text for text, _ in drawn_of(empty, extension, empty.context.object)]
+    assert names.index("κ2") < names.index("tactile.add_subdivision")
 
 
 def drawn_of(bpy, extension, obj):

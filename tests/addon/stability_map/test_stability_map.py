@@ -79,6 +79,16 @@ def test_a_ball_is_alike_all_over(empty):
     assert record["error_median"] == pytest.approx(np.median(error), rel=0.2)
 
 
+def test_a_map_shows_at_first_what_differs(empty, ball):
+    painted, record = stability_map(empty, spacing=1.0, extent=0.5, degree=4)
+    assert record["points"] == record["patches"] - record["in_doubt"]  # One color would show nothing.
+    assert painted.tactile_map_colors == "error"
+    grid(empty, 40)
+    painted, record = stability_map(empty, spacing=0.1, extent=0.25, step=0.05)
+    assert record["points"] > record["patches"] - record["in_doubt"] > 0
+    assert painted.tactile_map_colors == "reason"
+
+
 def test_what_a_map_says_is_what_a_touch_says(empty, touched):
     """The other operator touches some of the places with the same inputs."""
     empty.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24, radius=2.0)
@@ -594,5 +604,5 @@ def test_a_map_of_few_facets_is_in_doubt_and_says_why(empty, extension):
     assert record["in_doubt"] == record["few_facets"] == record["patches"] > 5
     words = extension.tactile_addon.stability_map.map_object.facets(record)
     assert words == f"Curvature of the facets, not of the shape, at {record['patches']} points"
-    rows = dict(extension.tactile_addon.stability_map.map_object.map_rows(record, ("m", 1.0)))
+    rows = dict(extension.tactile_addon.stability_map.map_object.map_rows(record))
     assert rows["… on Facets"] == str(record["few_facets"])

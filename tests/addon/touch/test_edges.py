@@ -166,9 +166,10 @@ def test_a_crease_of_a_fine_mesh_is_none_between_facets(empty, cube):
     assert "facets" not in str(caught.value)
 
 
-def test_what_rounding_leaves_of_nothing_is_said_to_be_none(extension):
-    said = extension.tactile_addon.sidebar.patch_rows
-    rows = dict(said.main_rows(RECORD, ("mm", 1.0)) + said.other_rows(RECORD, ("mm", 1.0)))
+def test_what_rounding_leaves_of_nothing_is_said_to_be_none(extension, empty):
+    settings, said = empty.context.scene.unit_settings, extension.tactile_addon.sidebar.patch_rows
+    settings.scale_length, settings.length_unit = 0.001, "MILLIMETERS"
+    rows = dict(said.main_rows(RECORD) + said.other_rows(RECORD))
     assert rows["κ1"] == "0 ± 0.01 1/mm"
     assert rows["κ2"] == "0.02 ± 0.01 1/mm"
     assert rows["K Gaussian"] == "0 ± 0.01 1/mm²"
@@ -216,13 +217,13 @@ PLACES = [(1.25 * math.cos(a), 1.25 * math.sin(a), z) for a in (0.02, 0.05, 0.09
 
 
 def test_the_verdict_on_few_facets_is_about_them_until_the_torus_is_subdivided(empty, extension):
-    wording, units = extension.tactile_addon.touch.wording, extension.tactile_addon.touch.units
+    wording = extension.tactile_addon.touch.wording
     empty.ops.mesh.primitive_torus_add()
     torus = empty.data.objects["Torus"]
     for place in PLACES:
         assert empty.ops.tactile.pick(target=torus.name, location=place, new=True) == {"FINISHED"}
         record = empty.context.object.children[0]["tactile"].to_dict()
-        said = wording.verdict(record, units.unit_of(empty.context.scene, record["radius"]))
+        said = wording.verdict(record)
         assert "make the facets finer" in said or "add a Subdivision modifier if the shape" in said
     empty.ops.ed.undo_push(message="Picked")
     by_hand(empty, empty.ops.tactile.add_subdivision)

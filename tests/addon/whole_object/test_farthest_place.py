@@ -17,7 +17,7 @@ def why(extension, empty):
             empty.context.object, empty.context.evaluated_depsgraph_get()
         )
         why_far = extension.tactile_addon.whole_object.both_ways.why_far
-        found = why_far(surface, np.subtract(place, surface.origin), off, patch, ("m", 1.0))
+        found = why_far(surface, np.subtract(place, surface.origin), off, patch, {"size": surface.size})
         return found and str(found).removeprefix(f"The surface is up to {off:g} m off the object ")
 
     return why

@@ -181,35 +181,49 @@ def test_quick_and_fine_have_other_tolerances(empty, ball):
         assert record["tolerance"] == pytest.approx(4.0 / share)
 
 
+def dialog_of(extension):
+    """The dialog of Touch All Over without a window; its `words` say what an object takes."""
+    operator = extension.tactile_addon.whole_object.object_operator.TACTILE_OT_touch_all_over
+
+    class Dialog:
+        _shape, accuracy, noise = None, "normal", 0.0
+
+        def words(self, context, target, tolerance=0.0):
+            self.tolerance = tolerance
+            return operator._estimate(self, context, target)
+
+    return Dialog()
+
+
 @pytest.mark.long
 def test_a_dialog_can_tell_how_many_touches_there_will_be(extension, empty, ball):
-    expected = extension.tactile_addon.whole_object.object_operator.Expected()
-    words = expected.words(ball, empty.context, 0.02, "normal", 0.0)
+    dialog = dialog_of(extension)
+    words = dialog.words(empty.context, ball, tolerance=0.02)
     assert words.startswith("Tolerance 0.02 m: about ") and " touches, " in words
     count = int(words.split()[4])
     record = made(empty.ops.tactile.touch_all_over, "tactile_object", tolerance=0.02)[1]
     assert 0.5 < count / record["touches"] < 2.0
-    assert expected.words(ball, empty.context, 0.005, "normal", 0.0) != words
+    assert dialog.words(empty.context, ball, tolerance=0.005) != words
 
 
 def test_a_dialog_can_tell_that_facets_will_be_felt(extension, empty):
-    expected = extension.tactile_addon.whole_object.object_operator.Expected()
+    dialog = dialog_of(extension)
     empty.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
     obj = empty.context.object
     for is_faceted in (True, False):
-        expected.words(obj, empty.context, 0.0, "normal", 0.0)
-        assert expected.is_faceted is is_faceted
-        assert expected.warnings == ["Touches will feel its facets one by one"] * is_faceted
+        dialog.words(empty.context, obj)
+        assert dialog._is_faceted is is_faceted
+        assert dialog._warnings == ["Touches will feel its facets one by one"] * is_faceted
         assert empty.ops.tactile.add_subdivision(target=obj.name) == {"FINISHED"}
 
 
 def test_a_dialog_can_tell_that_walls_are_thin(extension, empty):
-    expected = extension.tactile_addon.whole_object.object_operator.Expected()
+    dialog = dialog_of(extension)
     empty.ops.mesh.primitive_cube_add(size=1.0)
     empty.context.object.scale.z = 0.01
     empty.context.view_layer.update()
-    expected.words(empty.context.object, empty.context, 0.0, "normal", 0.0)
-    assert expected.warnings == ["Walls of 1 % of its size may be bridged or pierced"]
+    dialog.words(empty.context, empty.context.object)
+    assert dialog._warnings == ["Walls of 1 % of its size may be bridged or pierced"]
 
 
 def test_the_mesh_of_thin_walls_is_fine(extension):

@@ -139,9 +139,8 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball, extension):
     assert np.linalg.norm(record["deviation_place"]) == pytest.approx(2.0, abs=0.01)
     assert np.abs(values(surface.data, "deviation")).max() < 0.1
     report = extension.tactile_addon.whole_object.object_report
-    assert report.object_verdict(record).startswith(
-        f"Incomplete. Touching ended when {share} of the object was"
-    )
+    assert report.object_verdict(record).startswith("Incomplete: continue with more touches")
+    assert report.object_reasons(record)[0].startswith(f"Touching ended when {share} of the object was")
     assert "continue with more touches" in record["message"]
     assert report.object_summary(record) == f"Incomplete: 3 touches; {share} of the object"
     assert "Deviation" not in rows  # Most of it would be what was not felt.
