@@ -285,7 +285,8 @@ def _planes_around(quads: Indices, bent: Indices) -> tuple[Indices, Indices]:
     from scipy.sparse import csr_array
 
     ends = np.arange(0, 4 * len(quads) + 1, 4)
-    cells = csr_array((np.ones(4 * len(quads)), quads.ravel(), ends))
+    shape = len(quads), int(quads.max(initial=0)) + 1
+    cells = csr_array((np.ones(4 * len(quads)), quads.ravel(), ends), shape)
     shared = (cells[bent] @ cells.T).tocoo()
     return shared.col, shared.row
 
