@@ -155,7 +155,7 @@ def test_a_tip_that_no_patch_reaches_is_where_the_planes_of_walls_meet(cone):
 
 @pytest.mark.long
 def test_edges_so_long_that_no_triangle_is_left_are_refused_with_a_sentence(cone):
-    with pytest.raises(ValueError, match="edge: expected one for which there is room, got 0.8"):
+    with pytest.raises(ValueError, match=r"edge: expected one for which there is room, got 0\.8"):
         cone.mesh(0.8)
 
 
