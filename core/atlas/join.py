@@ -32,7 +32,7 @@ PATCHES_AT_ONCE, PLACES_AT_ONCE = 2, 1500  # A step takes this many patches, or 
 FARTHEST_RIM = 1.25  # A patch that is not flat counts up to this many radii of its domain.
 KNOTS_WITHIN = 1.3  # Heights at knots are taken up to this many times the domain's radius.
 ROUNDS = 2  # Patches are moved this often.
-MOVED = 0.03  # A place of a patch is moved by less than this share of the radius.
+MOVED = 2.0  # A place is moved by less than so many deviations: more is of a patch beyond its crease.
 
 Table = tuple[Array, float, Array, Array]  # Radii of the domain, half the side, coefficients, deviations.
 Joining = Generator[float, None, Charts]
@@ -111,7 +111,7 @@ def blend_heights(charts: Charts) -> Joining:
         moves = np.zeros(charts.heights.shape)
         for start in range(0, len(knots), PLACES_AT_ONCE):
             some = knots[start : start + PLACES_AT_ONCE]
-            moves.ravel()[some] = _move(charts, some // SIDE**2, x[some], y[some])
+            moves.ravel()[some] = _move(charts, some // SIDE**2, x[some], y[some], charts.stds.ravel()[some])
             yield 1.0
         # The outermost knots are beyond the spline, without a height: they move like those next to them.
         change = np.pad(moves[:, 1:-1, 1:-1], ((0, 0), (1, 1), (1, 1)), mode="edge")
@@ -122,13 +122,16 @@ def blend_heights(charts: Charts) -> Joining:
     return charts
 
 
-def _move(charts: Charts, patch: NDArray[np.intp], x: Array, y: Array) -> Array:
-    """How far patches (k,) have to move above local (x, y), in unit radius, to lie on the blend."""
+def _move(charts: Charts, patch: NDArray[np.intp], x: Array, y: Array, std: Array) -> Array:
+    """How far patches (k,) have to move above local (x, y), in unit radius, to lie on the blend.
+
+    std : (k,), deviations of their heights there
+    """
     points, normals = charts.world(patch, x, y)
     field = sheet_facing(charts, points, normals, LAYER * charts.radii[patch])
     up = row_dot(field.normal, charts.axes[patch, :, 2])
     move = -field.distance / np.maximum(up, FACING) / charts.radii[patch]
-    return np.where((field.patch >= 0) & (up > FACING) & (np.abs(move) < MOVED), move, 0.0)
+    return np.where((field.patch >= 0) & (up > FACING) & (np.abs(move) < MOVED * std), move, 0.0)
 
 
 def _contacts(contours: Sequence[list[Contour]]) -> tuple[Array, Array, NDArray[np.intp]]:
