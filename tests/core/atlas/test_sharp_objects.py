@@ -308,3 +308,27 @@ def test_where_walls_turn_smoothly_there_is_no_crease():
     assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1.0).max() < TOLERANCE
     a, b = mesh.vertices[mesh.triangles[:, :2]].transpose(1, 0, 2)
     assert np.einsum("ni,ni->n", a, b).min() < 0.8
+
+
+def chamfered(chamfer):
+    """The block with beveled edges, and a triangle at each corner."""
+    walls = []
+    for signs in np.ndindex(3, 3, 3):
+        way = np.array(signs) - 1
+        count = np.abs(way).sum()
+        if count:
+            size = np.abs(way) @ HALF - (count - 1) * chamfer
+            walls.append((tuple((way / math.sqrt(count)).tolist()), float(size / math.sqrt(count))))
+    normals, sizes = (np.array(values) for values in zip(*walls, strict=True))
+    return solids.Convex(
+        lambda x, y, z: float((normals @ (x, y, z) - sizes).max()), BLOCK.start, BLOCK.outward, tuple(walls)
+    )
+
+
+@pytest.mark.long
+def test_no_patch_takes_on_what_others_have_beyond_an_obtuse_crease():
+    """Patches that were moved onto the blend of all of them were off there: touches improved them in vain."""
+    solid = chamfered(0.1)
+    atlas = explored(solid, tolerance=4e-3, noise=0.0)
+    assert atlas.status == "ok" and len(atlas.patches) < 75
+    assert np.abs(solid.distances(atlas.reference.mesh.vertices)).max() < 3.0 * 4e-3
