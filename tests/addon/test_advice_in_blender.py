@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Advice helps: doubts that only Blender knows are gone where their advice was followed."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -106,11 +108,13 @@ def test_a_shorter_edge_length_helps(empty, code, edge):
 
 @pytest.mark.long
 def test_a_shorter_edge_length_helps_against_holes(empty):
-    empty.ops.mesh.primitive_cylinder_add(vertices=64, end_fill_type="NOTHING")
-    empty.ops.tactile.touch_all_over(tolerance=0.02, edge=0.2)
+    empty.ops.mesh.primitive_grid_add(x_subdivisions=100, y_subdivisions=100)
+    for vertex in empty.context.object.data.vertices:
+        vertex.co.z = 0.3 * math.sin(4.0 * vertex.co.x)
+    empty.ops.tactile.touch_all_over(tolerance=0.04, edge=0.6)
     record = empty.context.object["tactile_object"]
-    assert [doubt["code"] for doubt in record["doubts"]] == ["holes"]
-    assert empty.ops.tactile.mesh_again(edge=0.1) == {"FINISHED"}
+    assert "holes" in [doubt["code"] for doubt in record["doubts"]]
+    assert empty.ops.tactile.mesh_again(edge=0.3) == {"FINISHED"}
     assert empty.context.object["tactile_object"]["status"] == "ok"
 
 

@@ -119,7 +119,7 @@ def test_the_page_of_a_map(command, files, tmp_path):
         assert 150.0 < from_middle.max() < 160.0
         assert len(picture) < 2_000_000
     assert band(page, "± 5 % of the extent") == 100.0
-    assert re.search(r"Patch: \d+", text)
+    assert "Error: pale green at 0, dark red from" in text
     assert re.search(r"(\d+) patches at \1 points, 0 in doubt", text)
 
 

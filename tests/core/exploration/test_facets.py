@@ -197,19 +197,17 @@ def split(a, b, c):
 
 
 @pytest.mark.long
-def test_the_curvature_of_a_ball_is_right_or_said_to_be_that_of_facets():
-    """A ball of 320 triangles: more than a dozen of them are felt, and curvatures are off by up to .9."""
+def test_the_curvature_of_a_ball_of_few_facets_is_within_its_deviation():
+    """A ball of 320 triangles: a touch within a few of them would be off by up to .9."""
     ball, rng = icosphere(3), np.random.default_rng(0)
-    wrong, called = 0, 0
+    wrong, errors = 0, []
     for direction in rng.normal(size=(24, 3)):
         up = direction / np.linalg.norm(direction)
         point, normal = ball.ray_cast(tuple(2.0 * up), tuple(-up), 2.0)
         r = core.explore(ball, point, normal).result
-        off = max(abs(r.k1 + 1.0), abs(r.k2 + 1.0))
-        r, few = judged(r, ball)
-        wrong += off > 0.6 and not few and is_beyond(off, r)
-        called += few
-    assert called > 8
+        errors.append(max(abs(r.k1 + 1.0), abs(r.k2 + 1.0)))
+        wrong += is_beyond(errors[-1], r)
+    assert np.median(errors) < 0.2
     assert wrong <= 2
 
 
