@@ -182,7 +182,8 @@ def why_far(
     foot, normal = (np.array(vector) for vector in surface.project(place.tolist())[:2])
     narrow = narrowest(surface, foot, normal)
     words = say_of(report, off), say_of(report, narrow)
-    if surface.open_edge_distance(place) <= off:
+    # Where the edge itself is nearest, both are the same length, but for rounding.
+    if surface.open_edge_distance(place) <= 1.001 * off:
         code = "open_edges"
     elif narrow <= THIN_SHARE * surface.size:
         code = "narrow"
