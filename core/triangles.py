@@ -62,7 +62,7 @@ def closest_point(triangles: Array, points: Array) -> tuple[Array, Array]:
 def middles_of_parts(n: int) -> Array:
     """The barycentric coordinates (n^2, 3) of the middles of n^2 equal parts of a triangle.
 
-    Lines parallel to the sides divide axis side into n.
+    Lines parallel to the sides divide each side into n.
     """
     i, j = (index.ravel() for index in np.indices((n, n)))
     up, down = i + j < n, i + j < n - 1

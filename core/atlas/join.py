@@ -32,7 +32,7 @@ PATCHES_AT_ONCE, PLACES_AT_ONCE = 2, 1500  # A step takes this many patches, or 
 FARTHEST_RIM = 1.25  # A patch that is not flat counts up to this many radii of its domain.
 KNOTS_WITHIN = 1.3  # Heights at knots are taken up to this many times the domain's radius.
 ROUNDS = 2  # Patches are moved this often.
-MOVED = 2.0  # A place is moved by less than so many deviations: more is of a patch beyond its crease.
+MOVED = 2.0  # A place is moved by fewer deviations than this: what is more is of a patch beyond its crease.
 
 Table = tuple[Array, float, Array, Array]  # Radii of the domain, half the side, coefficients, deviations.
 Joining = Generator[float, None, Charts]

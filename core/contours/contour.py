@@ -149,10 +149,10 @@ class Contour:
 
     def part(self, which: slice | NDArray[Any], stops: tuple[str, str] | None) -> "Contour":
         """The contour of some of its contacts, or of all in another order, which are known to be valid."""
-        shorter = object.__new__(Contour)
+        contour = object.__new__(Contour)
         normals = None if self.normals is None else self.normals[which]
-        vars(shorter).update(vars(self), points=self.points[which], normals=normals, stops=stops)
-        return shorter
+        vars(contour).update(vars(self), points=self.points[which], normals=normals, stops=stops)
+        return contour
 
     def copied(self) -> "Contour":
         """A copy whose arrays cannot be written to."""

@@ -29,9 +29,9 @@ from .facets import with_facets
 from .options import ExplorationOptions
 from .taps import tapped
 
-# benchmarks.real --only automatic chose these. The longest half curves that are tried have so many contacts.
-# Each next one is shorter by the same ratio; after these, which halve it, the step is halved. Fewer give less
-MOST_CONTACTS, RUNGS = 16, 4  # area.
+# benchmarks.real --only automatic chose these. Fewer of either give less area.
+MOST_CONTACTS = 16  # The longest half curves that are tried have this number of contacts.
+RUNGS = 4  # After this number of lengths with one ratio, which halve them, the step is halved.
 HALVINGS = 6  # The step is halved this many times. With 7 more patches of single facets are taken for sure.
 # Contacts up to this roughness are fitted: with 0.012 there are a quarter more fits, and one of 540 more is
 ROUGH = 0.01  # sure.
@@ -157,11 +157,12 @@ class Touch:
             tried.append(explored)
             r = explored.result
             is_noisy = r.mean_height_std > DOUBTFUL_STD * r.radius and not suffices(r)
+            # Noise leaves shorter half curves even less certain, and these lie in fewer facets.
             if is_noisy or [doubt.code for doubt in r.doubts] == ["facets"]:
-                break  # Noise leaves shorter half curves even less certain, and on these are fewer facets.
+                break
         if rough or not tried:
-            longest = 0.0, (self.farthest / MOST_CONTACTS, MOST_CONTACTS)
-            _, rung = min(rough, key=lambda pair: pair[0], default=longest)
+            longest = self.farthest / MOST_CONTACTS, MOST_CONTACTS
+            _, rung = min(rough, key=lambda pair: pair[0], default=(0.0, longest))
             try:
                 tried.append((yield from self._felt(*rung)))
             except DegenerateCurvesError as why:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cache
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -54,7 +54,7 @@ class Facet(NamedTuple):
         return float(np.ptp(self.corners @ across)) / length if length else 0.0
 
 
-def with_facets(r: Reconstruction, surface: Any) -> Reconstruction:
+def with_facets(r: Reconstruction, surface: object) -> Reconstruction:
     """The reconstruction, with curvatures as uncertain as facets leave those of the shape they stand for.
 
     It is the same on a surface without faces, and on a fine one, whose facets are narrow compared with the

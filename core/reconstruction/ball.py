@@ -108,6 +108,6 @@ def _slope(s: Array, z: Array) -> tuple[float, float, float]:
     """The slope at 0 of the parabola through z (n,) at s (n,), its deviation per noise, and the noise."""
     basis = np.vander(s, 3)
     inverse = np.linalg.pinv(basis)
-    cubic = inverse @ z
-    off = float(np.linalg.norm(z - basis @ cubic)) / np.sqrt(len(s) - 3.0)
-    return float(cubic[1]), float(np.linalg.norm(inverse[1])), off
+    parabola = inverse @ z
+    off = float(np.linalg.norm(z - basis @ parabola)) / np.sqrt(len(s) - 3.0)
+    return float(parabola[1]), float(np.linalg.norm(inverse[1])), off

@@ -74,8 +74,8 @@ def verify(
 
     Raises ValueError for bad numbers.
     """
-    *_, numbers = verifying(r, surface, vertices, extra=extra)
-    return numbers
+    *_, measures = verifying(r, surface, vertices, extra=extra)
+    return measures
 
 
 def verifying(
@@ -83,27 +83,27 @@ def verifying(
 ) -> Iterator[dict[str, float]]:
     """`verify` in short steps: each yields the measures so far, and the last one all."""
     local = r.frame.to_local(finite_array("vertices", vertices, (None, 3)))
-    numbers: dict[str, float] = {"contacts": len(r.contacts), "vertices": len(local)}
-    numbers |= _spread("contact", distances(r.geometry, r.contacts))
+    measures: dict[str, float] = {"contacts": len(r.contacts), "vertices": len(local)}
+    measures |= _spread("contact", distances(r.geometry, r.contacts))
     offsets = np.empty(len(local))
     for start in range(0, len(local), VERTICES_AT_ONCE):
         some = slice(start, start + VERTICES_AT_ONCE)
         offsets[some] = distances(r.geometry, local[some])
-        yield numbers
+        yield measures
     contours = _extra_contours(r, surface, extra)
     points = np.concatenate([np.empty((0, 3)), *contours])
-    numbers |= {
+    measures |= {
         **_spread("vertex", offsets),
         "fit_error": r.fit_error,
         "extra_contours": sum(len(contour) > 0 for contour in contours),
         "extra_points": len(points),
         "total_absolute_curvature": r.total_absolute_curvature,
     }
-    yield numbers
-    numbers["overlap"] = _overlap(r, surface)
+    yield measures
+    measures["overlap"] = _overlap(r, surface)
     if len(points):
-        numbers["extra_fit_error"] = fit_error(r.geometry, points)
-    yield numbers
+        measures["extra_fit_error"] = fit_error(r.geometry, points)
+    yield measures
 
 
 def _spread(name: str, offsets: Array) -> dict[str, float]:

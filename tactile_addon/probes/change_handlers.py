@@ -138,7 +138,7 @@ def _concerned(depsgraph: bpy.types.Depsgraph) -> tuple[list[Object], bool]:
     found = [obj for obj in there if is_probe(obj)]
     if scene and not found:
         targets.cache_clear()  # The last one may have been deleted.
-    return [
+    concerned = [
         obj
         for obj in sorted(found, key=lambda probe: probe.name)
         if unsure
@@ -148,7 +148,8 @@ def _concerned(depsgraph: bpy.types.Depsgraph) -> tuple[list[Object], bool]:
             (scene or getattr(obj.tactile_probe.target, "name", None) in named)
             and may_be_outdated(obj, there)
         )
-    ], unsure
+    ]
+    return concerned, unsure
 
 
 def is_pending(probe: Object) -> bool:

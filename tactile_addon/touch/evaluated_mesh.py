@@ -101,7 +101,8 @@ def coordinates(evaluated: Object) -> Array:
 
 def size_of(evaluated: Object, linear: Array) -> float:
     """The longest edge of the object's bounding box, in the world."""
-    return float((np.ptp(np.array(evaluated.bound_box), axis=0) * np.linalg.norm(linear, axis=0)).max())
+    edges = np.ptp(np.array(evaluated.bound_box), axis=0)
+    return float((edges * np.linalg.norm(linear, axis=0)).max())
 
 
 def require_invertible(name: str, matrix: Array) -> None:
@@ -161,12 +162,13 @@ class PlacedMesh:
         short = SHORT_SHARE * reach  # A long ray that meets nothing takes long.
         starts, downs = points + short * normals, -normals
         rays = list(zip(starts.tolist(), downs.tolist(), strict=True))
+        hits = [self.ray_cast(start, down, 2.0 * short) for start, down in rays]
         return np.array(
             [
                 self._deviation(points[i], normals[i], reach)
                 if hit is None
                 else math.dist(rays[i][0], hit[0]) - short
-                for i, hit in enumerate([self.ray_cast(start, down, 2.0 * short) for start, down in rays])
+                for i, hit in enumerate(hits)
             ]
         )
 

@@ -106,8 +106,9 @@ def suggestion_report(result: core.Reconstruction, reference: Array) -> dict[str
 
 def measures(result: core.Reconstruction) -> TouchReport:
     """The parts of a report that take long or matter only once a gesture has ended."""
+    rim = result.domain.boundary(RIM_POINTS)
     return {
-        "height_std_rim": float(result.height_std(*result.domain.boundary(RIM_POINTS).T).max()),
+        "height_std_rim": float(result.height_std(*rim.T).max()),
         "area": result.domain.area,
         "total_absolute_curvature": result.total_absolute_curvature,
         "condition_number": result.condition_number,

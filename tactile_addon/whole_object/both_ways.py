@@ -164,7 +164,8 @@ class BothWays:
 
 def room(surface: DetachedMesh, place: Array, way: Array) -> float:
     """How far the next wall is from a place of the mesh along a direction; inf if there is none."""
-    hit = surface.ray_cast((place + LIFT * surface.size * way).tolist(), way.tolist(), 2.0 * surface.size)
+    start = (place + LIFT * surface.size * way).tolist()
+    hit = surface.ray_cast(start, way.tolist(), 2.0 * surface.size)
     return math.inf if hit is None else math.dist(hit[0], place)
 
 
