@@ -115,13 +115,19 @@ def objects(bpy, touch):
 
 
 def places(obj, depsgraph, count=POINTS, seed=0):
-    """Random places in the world on the faces of an object as Blender evaluates it."""
+    """Random places in the world on the faces of an object as Blender evaluates it.
+
+    The faces and their corners are sorted, because Blender adds some shapes in an order that varies.
+    """
+    from mathutils import Vector
+
     mesh, rng = obj.evaluated_get(depsgraph).data, np.random.default_rng(seed)
-    areas = np.array([face.area for face in mesh.polygons])
+    faces = sorted(
+        (sorted(tuple(mesh.vertices[i].co) for i in face.vertices), face.area) for face in mesh.polygons
+    )
+    areas = np.array([area for _, area in faces])
     for number in rng.choice(len(areas), count, p=areas / areas.sum()):
-        corners = [
-            np.array(obj.matrix_world @ mesh.vertices[i].co) for i in mesh.polygons[int(number)].vertices
-        ]
+        corners = np.array([obj.matrix_world @ Vector(corner) for corner in faces[number][0]])
         yield rng.dirichlet(np.ones(len(corners))) @ corners
 
 
