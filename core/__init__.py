@@ -22,7 +22,6 @@ from .contours.contour import (
     EXTENT,
     NO_CONTACT,
     NOT_MONGE,
-    UNEXPLAINED,
     WHERE,
     Contour,
     SamplingPlane,
@@ -39,11 +38,11 @@ from .exploration.taps import MeshError, doubts_by_mesh, mesh_error
 from .exploration.touches import explore, explore_many
 from .paper.by_method import SOLVERS
 from .patch.domain import Domain
-from .patch.geometry import Geometry, distances, fit_error, overlapped
+from .patch.geometry import Geometry, distances, fit_error
 from .patch.monge import MongePatch
 from .reconstruction.deviations import gaussian_curvature_stds
 from .reconstruction.from_contours import reconstruct, reconstruct_many
-from .reconstruction.next_plane import azimuth_of, suggest_plane
+from .reconstruction.next_plane import suggest_plane
 from .reconstruction.options import METHODS
 from .reconstruction.result import Reconstruction
 from .reconstruction.serialization import from_dict, to_dict
@@ -52,7 +51,7 @@ from .scan.face_orientation import DOUBLED, INWARD, open_edge_distance, orientat
 from .scan.pose_search import Pose, register
 from .scan.sampling import scattered, spaced, spaced_count
 from .scan.verification import reachable, verify, verifying
-from .verdict import FINER, OK, SHORTER_EDGES, SUBDIVIDE, UNCERTAIN, Doubt, status_of
+from .verdict import FINER, SHORTER_EDGES, SUBDIVIDE, Doubt, status_of
 
 __version__ = "0.1.0"  # That of blender_manifest.toml; python -m tools.release compares them.
 # What a script may rely on, as docs/reference.md describes it. The other names are for the add-on.

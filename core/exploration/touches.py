@@ -55,7 +55,7 @@ def explore(
     noise, rng, tangent : as in `track`; the contours pass the noise on to the fit
     method, degree, weight, solver : as in `reconstruct`
 
-    If a contour was not followed any farther, its `stops` are UNEXPLAINED. Raises what `track` and
+    Half curves that the touch ends itself have the stop "fit no longer matched". Raises what `track` and
     `reconstruct` raise, and ValueError where curves do not end and `farthest` is None.
 
     >>> import math
