@@ -67,6 +67,10 @@ class _State(NamedTuple):
     prior: Array
     noise: Array
 
+    def at(self, which: NDArray[np.bool_]) -> "_State":
+        """The state of some of the touches."""
+        return _State._make(values[which] for values in self)
+
 
 def joint_fit(
     given: Observations, weights: Array, k1: Array, k2: Array
@@ -81,26 +85,24 @@ def joint_fit(
     contacts have in the end: where one is beyond OUTLYING standard deviations, they weigh as under a
     Student t distribution.
     """
-    floor = np.maximum(given.noise, MISFIT)
+    given = given._replace(noise=np.maximum(given.noise, MISFIT))
     usual = USUAL_VARIANCES[None].repeat(len(k1), axis=0)
-    state = _State(_first_axes(given.contacts, weights, k1, k2), k1, k2, weights, usual, floor)
-    return _passes(given._replace(noise=floor), state, 0)
-
-
-def _passes(given: Observations, state: _State, step: int) -> tuple[Array, SurfacePosterior, Array]:
-    """What `joint_fit` gives, from a pass on."""
-    state, settled, surface = _pass(given, state, step)
-    if surface is None:
-        return _passes(given, state, step + 1)
-    settled_state, left = (state.axes, surface, state.weights), ~settled
-    if left.any():
-        rest = _passes(given.at(left), _State(*(v[left] for v in state)), step + 1)
-        arrays = (
-            (axes, of.mean, of.root, of.noise, of.visibility, w) for axes, of, w in (settled_state, rest)
-        )
-        for whole, part in zip(*arrays, strict=True):
-            whole[left] = part
-    return settled_state
+    state = _State(_first_axes(given.contacts, weights, k1, k2), k1, k2, weights, usual, given.noise)
+    results: list[Array] = []
+    active = np.arange(len(k1))  # The touches that are not settled yet.
+    for step in range(PASSES):
+        state, settled, of = _pass(given, state, step)
+        if of is None:
+            continue
+        arrays = [state.axes, of.mean, of.root, of.noise, of.visibility, state.weights]
+        results = results or arrays
+        for result, array in zip(results, arrays, strict=True):
+            result[active] = array
+        if settled.all():
+            break
+        active, given, state = active[~settled], given.at(~settled), state.at(~settled)
+    axes, mean, root, noise, visibility, weights = results
+    return axes, SurfacePosterior(mean, root, noise, visibility), weights
 
 
 def _first_axes(contacts: Array, weights: Array, k1: Array, k2: Array) -> Array:
@@ -155,7 +157,7 @@ def _pass(
 
 
 def _hyperparameters(state: _State, data: Sextics, floor: Array, step: int) -> Hyperparameters:
-    """Waviness and noise, which are found anew after the first pass and while there are outliers."""
+    """Waviness and noise, which are estimated anew after the first pass and while contacts are outliers."""
     stale = ((state.weights > 0.0) & (state.weights < 1.0)).any(axis=1) | (step == 1)
     if not stale.any():
         return Hyperparameters(state.prior, state.noise)
