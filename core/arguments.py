@@ -5,7 +5,7 @@
 import math
 import reprlib
 from collections.abc import Iterable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,6 +47,11 @@ def finite_array(
             f"{name}: expected numbers up to {largest:g}, got larger ones: use another unit of length"
         )
     return array
+
+
+def set_fields(instance: object, **values: Any) -> None:
+    """Writes checked values into fields of a frozen dataclass, whose own __setattr__ raises."""
+    vars(instance).update(values)
 
 
 def list_of(name: str, values: Iterable[T], kind: type[T]) -> list[T]:

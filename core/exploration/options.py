@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import list_of, number
+from ..arguments import list_of, number, set_fields
 from ..contours.contour import SamplingPlane
 from ..contours.tracking import generator_of
 from ..reconstruction.options import FitOptions
@@ -62,7 +62,8 @@ class ExplorationOptions:
         extent, step = _length("extent", self.extent), _length("step", self.step)
         if extent and step and step > extent:
             raise ValueError(f"step: expected no more than the extent {extent:g}, got {step:g}")
-        vars(self).update(  # __setattr__ of a frozen dataclass raises.
+        set_fields(
+            self,
             planes=planes_of(self.planes),
             extent=extent,
             step=step,

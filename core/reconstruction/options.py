@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arguments import number, shown
+from ..arguments import number, set_fields, shown
 from ..paper.by_method import PAPER_METHODS, SOLVERS
 
 METHODS = ("bayes", *PAPER_METHODS)
@@ -43,7 +43,8 @@ class FitOptions:
         degree, weight = self.degree, self.weight
         if not isinstance(degree, int | np.integer | str) or degree not in ("auto", 2, 3, 4, 5, 6):
             raise ValueError(f'degree: expected a whole number from 2 to 6 or "auto", got {shown(degree)}')
-        vars(self).update(  # __setattr__ of a frozen dataclass raises.
+        set_fields(
+            self,
             degree=degree if isinstance(degree, str) else int(degree),
             noise=None if self.noise is None else number("noise", self.noise, least=0.0),
             point_std=None if self.point_std is None else number("point_std", self.point_std, least=0.0),
