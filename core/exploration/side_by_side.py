@@ -16,7 +16,7 @@ from ..contours.finger import SAME_SHEET_COSINE, NoContactError, Surface, checke
 from ..contours.tracking import generator_of, track, tracker
 from ..reconstruction.from_contours import fitted
 from ..reconstruction.options import FitOptions
-from ..reconstruction.start import Given
+from ..reconstruction.start import TouchContacts
 from ..reconstruction.strokes import gathered
 from .extent import MOST_CONTACTS, Answer, Exploration, Request, Steps, Touch
 from .options import ExplorationOptions
@@ -155,7 +155,7 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
         for method in dict.fromkeys(("bayes", fit.method)):
             which = [i for i, r in requests.items() if ("bayes" if r.searching else fit.method) == method]
             options = replace(fit, method=method)
-            touches = [Given(requests[i].contours, *gathered(())) for i in which]
+            touches = [TouchContacts(requests[i].contours, *gathered(())) for i in which]
             if which:
                 results = fitted(points[which], touches, outward[which], options)
                 answers.update(zip(which, results, strict=True))

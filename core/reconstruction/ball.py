@@ -19,9 +19,10 @@ from ..contours.contour import Contour
 from ..contours.local_geometry import DegenerateCurvesError
 from .result import Reconstruction
 
-# Slopes of centers are those of parabolas through SIDE centers, or a SIDES-th of all, on either side.
-SIDE, SIDES = 8, 6
-KINK, KINK_STDS = 0.1, 5.0  # They have a kink if slopes differ by more, and by more of their deviations.
+# Slopes on either side of a place are those of parabolas through the first number of centers, or through all
+# centers divided by the second number if these are more.
+PARABOLA_CENTERS, PARABOLAS = 8, 6
+KINK, KINK_STDS = 0.1, 5.0  # Centers have a kink if slopes differ by more, and by more of their deviations.
 
 
 def ball_of(contours: Sequence[Contour], strokes: Sequence[ArrayLike | Contour]) -> float:
@@ -85,7 +86,7 @@ def _require_reached(centers: Reconstruction, contour: Contour) -> None:
     way = local[np.argmax(away), :2] / max(float(away.max()), SMALLEST)
     order = np.argsort(local[:, :2] @ way, kind="stable")
     s, z = (local[:, :2] @ way)[order], local[order, 2]
-    count = max(SIDE, len(s) // SIDES)
+    count = max(PARABOLA_CENTERS, len(s) // PARABOLAS)
     bends = []
     for i in range(count, len(s) - count + 1):
         middle = 0.5 * (s[i - 1] + s[i])
