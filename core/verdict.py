@@ -221,10 +221,10 @@ class Doubt:
     """A reason to doubt a result.
 
     code : of REASONS
-    value, limit : what was found, and the value up to which there is no doubt: shares, angles in radians,
+    value, limit : the value in doubt, and the one up to which there is no doubt: shares, angles in radians,
         numbers, or lengths in the caller's unit
     words : what else its sentence has: a place, a count, a length in its unit
-    useless : advice of its reason that does not apply, as what the touch has tried by itself
+    useless : advice of its reason that does not apply, as what the touch has tried already
     """
 
     code: str
@@ -299,7 +299,7 @@ class Judged(ABC):
 
     @cached_property
     def gravest(self) -> Doubt | None:
-        """The gravest doubt, or None; the others are not looked for, which would take longer."""
+        """The gravest doubt, or None; the others are not computed, which would take longer."""
         return next(self._doubting(), None)
 
     @property

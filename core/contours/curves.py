@@ -14,7 +14,7 @@ from .contour import Contour
 # This many contacts are "very close to p" (benchmarks.accuracy). The number is even, because a cubic term
 # does not bend a quadratic over equal sides.
 WINDOW = 10
-LEAST_CONTACTS = 3  # A contour has more than the quadratic's two unknowns, besides the reference point.
+LEAST_CONTACTS = 3  # A contour has more than the quadratic's two unknowns, without the reference point.
 RIDGE = 1e-12  # This share is added to the equations of r0, r1 and r2, because all s may be the same.
 MIN_NORMAL_STD = 1e-6  # Measured normals have at least this deviation, in radians.
 
