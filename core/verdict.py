@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
+SIGNIFICANT = 5.0  # Noise does not explain what is off by more standard deviations (benchmarks.stability).
 OK, UNCERTAIN, NOT_CONVERGED = "ok", "uncertain", "not_converged"  # Each status.
 
 SHORTER, LONGER, PLANES = "use a shorter extent", "use a longer extent", "add sampling planes"

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from core import verdict
 from core.atlas import curvature, expected, object_atlas, samples, touching
 from core.atlas import measured as atlas_measured
 from core.bayes import bends, evidence, joint_fit, kernel, posterior, prior, process_fit
@@ -76,7 +77,7 @@ PROMISES = [
     ("methods", "if more than # % of its area has no surface", 100 * status.DOUBTFUL_GAP),
     ("methods", "each a sixth shorter", round(1 / (1 - 0.5 ** (1 / extent.RUNGS))) / 6),
     ("methods", "At most one in a hundred contacts is off it by more than five", 100 * explained.FEW),
-    ("methods", "off it by more than five deviations", explained.TOO_FAR / 5),
+    ("methods", "off it by more than five deviations", verdict.SIGNIFICANT / 5),
     ("methods", "at most # % of the radius in the mean", 100 * extent.TAPS_OFF),
     ("methods", "left after three rounds", touching.AGAIN / 3),
     ("methods", "within # of the radius, a linear map", posterior.QUARTIC_SHARE),

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from ..arguments import SMALLEST, Array
 from ..contours.contour import Contour
+from ..contours.curves import RIDGE
 from ..contours.local_geometry import Frame
+from ..verdict import SIGNIFICANT
 
 # M bends, or LEAST_BENDS if there are fewer, show a curvature to the share (FEW_BENDS / M)^3. Fewer than
 # FEW_BENDS are those of folds or facets (benchmarks.curvatures: folds, tips of cones; a cylinder of 24 facets
@@ -26,10 +28,8 @@ STEPS_AROUND = (
     9  # The steps around one whose median rate of turning is even: two folds are in up to four of them.
 )
 FOLD_BEND = 3.0  # A fold by an angle a bends a patch by up to 3 a / L, if it is next to the point.
-EXPLAINED_STDS = 5.0  # Turns that are off even ones by fewer deviations are explained by noise.
 MOST_CHORDS = 24  # A curve without normals has at most this number of chords, as a touch has steps.
 SHORT_STEP = 0.1  # Steps count as this share of the mean at least: contacts in one place are no fold.
-RIDGE = 1e-12  # It is added to the equations of x^2, xy and y^2, because outliers may leave two curves.
 ROUNDED_TURN = 1e-6  # A curve whose normals turn by less, in radians, turns by rounding.
 
 
@@ -51,6 +51,7 @@ class Bends(NamedTuple):
     def covariance(self) -> Array:
         """The covariance (3, 3) of the coefficients of x^2, xy and y^2, in unit radius, from few bends."""
         second = self.second
+        # Outliers may leave two curves.
         inverse = np.linalg.solve(second @ second.T + RIDGE * np.eye(3), second)
         covariance: Array = (inverse * self.stds**2) @ inverse.T
         return covariance
@@ -169,7 +170,7 @@ def _unexplained(of: _Turns, beyond: Array) -> Array:
     pairs = np.abs(beyond[1:] + beyond[:-1]) * (of.curve[1:] == of.curve[:-1])
     pairs /= np.maximum(stds[1:], stds[:-1])
     off = np.maximum.reduce([np.abs(beyond) / stds, np.append(pairs, 0.0), np.append(0.0, pairs)])
-    return np.where(off > EXPLAINED_STDS, beyond, 0.0)
+    return np.where(off > SIGNIFICANT, beyond, 0.0)
 
 
 def _with_neighbors(of: _Turns, turns: Array, beyond: Array) -> Array:

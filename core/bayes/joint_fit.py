@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import Array
+from ..arguments import DECIMALS, Array
 from ..contours.contour import along, cross, dot, scaled
 from ..contours.local_geometry import UMBILIC
+from ..verdict import SIGNIFICANT
 from .evidence import Hyperparameters
 from .posterior import SurfacePosterior
 from .prior import FREE, USUAL_VARIANCES, prior_mean
@@ -24,14 +25,12 @@ from .sextic import Sextics, mean_given, posterior_given, sextics, with_scatter
 # The noise is at least this share of the radius, because no surface is a polynomial. With less the waviness
 # follows what polynomials leave, and automatic touches end earlier (benchmarks.model, e20b52a).
 MISFIT = 2e-3
-# benchmarks.accuracy judges these, and the outliers of benchmarks.stability the last two.
+# benchmarks.accuracy judges these, and the outliers of benchmarks.stability the last.
 # The largest number of passes: two turn the frame to what they found, others are for outliers.
 PASSES = 8
 SETTLED_WEIGHT = 0.1  # A fit is settled when no weight changes by more between passes.
 ALIKE_CURVATURES = 1e-4  # Curvatures that differ by less count as alike; heights change by an eighth of it.
 LEVEL = 5e-3  # Axes are level when the slope is less: heights change by its product with slope and height.
-DECIMALS = 9  # Heights and distances are compared to this decimal, so that rounding does not choose.
-OUTLYING = 5.0  # A contact off by more standard deviations is an outlier.
 STUDENT = 4.0  # Outliers weigh as under a Student t distribution of this many degrees of freedom.
 
 
@@ -82,7 +81,7 @@ def joint_fit(
 
     Returns the columns d1, d2, n (b, 3, 3) in the frame given, the posteriors in the new one, where
     the means of the slopes and of the mixed second derivative are 0, and the weights (b, n) that the
-    contacts have in the end: where one is beyond OUTLYING standard deviations, they weigh as under a
+    contacts have in the end: where one is beyond SIGNIFICANT standard deviations, they weigh as under a
     Student t distribution.
     """
     given = given._replace(noise=np.maximum(given.noise, MISFIT))
@@ -196,9 +195,9 @@ def posteriors_of(
 def _student_weights(residuals: Array, present: NDArray[np.bool_], floor: Array) -> Array:
     """Weights of the contacts, (b, n): all 1 if none of a touch is outlying, 0 where there is no contact."""
     misses, weights = np.abs(residuals), present.astype(float)
-    for i in np.flatnonzero((present & (misses > OUTLYING * floor[:, None])).any(axis=1)):
+    for i in np.flatnonzero((present & (misses > SIGNIFICANT * floor[:, None])).any(axis=1)):
         ratios = misses[i] / max(floor[i], 1.4826 * float(np.median(misses[i][present[i]])))
-        if ratios[present[i]].max() > OUTLYING:
+        if ratios[present[i]].max() > SIGNIFICANT:
             weights[i] *= (STUDENT + 1.0) / (STUDENT + ratios**2)
     return weights
 

@@ -16,6 +16,7 @@ from ..arguments import (
     finite_array,
     list_of,
     number,
+    number_or_none,
     set_fields,
     shown,
     unit_vector,
@@ -109,16 +110,16 @@ class Contour:
                     f"points: numbers of single precision are {spacing:g} apart here, too coarse for a curve "
                     "of this size: expected coordinates relative to a nearby point, or double precision"
                 )
-        up, normals, std = self.plane_normal, self.normals, self.normal_std
+        up, normals = self.plane_normal, self.normals
         set_fields(
             self,
             points=points,
             plane_normal=None if up is None else unit_vector("plane_normal", up),
             normals=None if normals is None else finite_array("normals", normals, (len(points), 3)),
-            noise=None if self.noise is None else number("noise", self.noise, least=0.0),
+            noise=number_or_none("noise", self.noise, least=0.0),
             stops=None if self.stops is None else tuple(list_of("stops", self.stops, str)),
-            normal_std=None if std is None else number("normal_std", std, least=0.0),
-            ball=None if self.ball is None else number("ball", self.ball, above=0.0),
+            normal_std=number_or_none("normal_std", self.normal_std, least=0.0),
+            ball=number_or_none("ball", self.ball, above=0.0),
         )
         if self.stops is not None and len(self.stops) != 2:
             raise ValueError(f"stops: expected two words, got {shown(self.stops)}")

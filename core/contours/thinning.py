@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import Array
+from ..arguments import DECIMALS, Array
 from .contour import Contour, consistently_oriented
 from .curves import WINDOW, distances_from_point
 
@@ -24,7 +24,6 @@ MOST_CONTACTS = 100
 CELLS = 1000  # The curve's longer side has this many cells. A place is a cell and its neighbors.
 RESTING = 4  # A place with more times the usual number of contacts is a rest.
 TANGENT_SHARE = 1 / 16  # This share of the cells with contacts shows the tangent, also of a steep curve.
-DECIMALS = 9  # Weights are compared to this decimal, so that rounding does not choose.
 
 
 def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:

@@ -17,14 +17,13 @@ from ..reconstruction.result import Reconstruction
 
 # benchmarks.facets shows how far curvatures are off with these.
 # The shape's are those by which facets turn within the first number of widths, and those of the corners of
-# facets within the others, where the patch turns by BEND or less.
+# facets within the others, where the patch turns by SMOOTH or less.
 TURNING, CORNERS = 2.0, (0.6, 1.3)
 # Corners determine a quadric if the smallest singular value of their equations is above this share.
 DETERMINED = 0.01
-BEND = math.radians(40.0)
 TURNS = np.radians([0.0, 20.0, 40.0])  # The curves, turned by these around the normal, show where facets are.
-# Edges between these angles stand for a smooth bend,
-DISTINCT_COSINE, SMOOTH_COSINE = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))
+# Edges that turn by angles between these stand for a smooth bend,
+DISTINCT, SMOOTH = math.radians(1.0), math.radians(40.0)
 # if both facets have this share of the wider one's width across it; else one is a fillet. Facets are fine if
 # the one at the point is narrower than this share of the radius.
 MIN_WIDTH_RATIO = 0.25
@@ -84,9 +83,9 @@ def is_beside_bend(point: Array, mesh: FacetedSurface) -> bool:
 def _around(r: Reconstruction, reach: float) -> Array:
     """Points (n, 3) of the world along the curves, out to a length, and these turned around the normal.
 
-    Where facets narrow, as near the tip of a cone, the points reach no farther than the patch turns by BEND.
+    Where facets narrow, as near the tip of a cone, the points end where the patch has turned by SMOOTH.
     """
-    reach = 1.0 / max(abs(r.k1) / BEND, abs(r.k2) / BEND, 1.0 / reach)
+    reach = 1.0 / max(abs(r.k1) / SMOOTH, abs(r.k2) / SMOOTH, 1.0 / reach)
     points = np.vstack([contour.points for contour in r.contours])
     x, y, z = reach / r.radius * r.frame.to_local(points).T
     turned = [(x * c - y * s, x * s + y * c, z) for c, s in zip(np.cos(TURNS), np.sin(TURNS), strict=True)]
@@ -146,7 +145,7 @@ def _bends(point: Array, mesh: FacetedSurface) -> Iterator[tuple[float, float]]:
         width = facet.width(edge)
         beyond = start + 0.5 * edge + NEIGHBOR_STEP * width * out / np.linalg.norm(out)
         neighbor = _facet(mesh, mesh.face_near(beyond))
-        if SMOOTH_COSINE < float(facet.normal @ neighbor.normal) < DISTINCT_COSINE:
+        if math.cos(SMOOTH) < float(facet.normal @ neighbor.normal) < math.cos(DISTINCT):
             yield width, neighbor.width(edge)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import list_of, number, set_fields
+from ..arguments import list_of, number, number_or_none, set_fields
 from ..contours.contour import SamplingPlane
 from ..contours.tracking import generator_of
 from ..reconstruction.options import FitOptions
@@ -69,7 +69,7 @@ class ExplorationOptions:
             step=step,
             farthest=extent or _length("farthest", self.farthest),
             largest_std=_length("largest_std", self.largest_std),
-            tolerance=None if self.tolerance is None else number("tolerance", self.tolerance, least=0.0),
+            tolerance=number_or_none("tolerance", self.tolerance, least=0.0),
             most_planes=number("most_planes", self.most_planes, least=3.0),
             noise=number("noise", self.noise, least=0.0),
         )

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, many, set_fields
 from ..bayes.bends import Bends, bends_of
-from ..bayes.joint_fit import MISFIT, OUTLYING, posterior_of
+from ..bayes.joint_fit import MISFIT, posterior_of
 from ..bayes.near_point import curvature_contradiction
 from ..bayes.normals import contradiction, measured_normals, scatter
 from ..bayes.other_curves import LEAST_CURVES, contradicting_curve
@@ -33,7 +33,7 @@ from ..patch.domain import AT_POINT, Domain
 from ..patch.geometry import Geometry, similarity, total_absolute_curvature
 from ..patch.monge import MongePatch, exponents, monomials
 from ..patch.triangulation import patch_mesh
-from ..verdict import Doubt, Judged, beyond
+from ..verdict import SIGNIFICANT, Doubt, Judged, beyond
 from . import status
 from .status import Taps
 
@@ -256,7 +256,7 @@ class Reconstruction(Judged):
         """How unevenly the surface bends along the curves."""
         fitted = float(self.posterior.noise)
         noises = [fitted if c.noise is None else c.noise / self.radius for c in self.contours]
-        contours, most = self.contours, OUTLYING * max(fitted, MISFIT) * self.radius
+        contours, most = self.contours, SIGNIFICANT * max(fitted, MISFIT) * self.radius
         if self._departures.max() > most:
             contours = tuple(self._explained(c, most) if c.normals is None else c for c in contours)
         noise, terms = max(noises, default=0.0), self.posterior.polynomial[2:FREE]
@@ -395,7 +395,7 @@ class Reconstruction(Judged):
         if status.is_on_flat_face(bent, std, self.contours, self.frame.origin):
             yield Doubt("flat_face", bent, std, useless=useless)
         yield from beyond("folds", self.bends.folded, status.DOUBTFUL_FOLD, useless)
-        yield from beyond("bend", self.curvature_contradiction, status.SIGNIFICANT, useless)
+        yield from beyond("bend", self.curvature_contradiction, SIGNIFICANT, useless)
 
     @property
     def _notes(self) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import LARGEST, SMALLEST, Array, finite_array, number, shown
+from ..arguments import LARGEST, SMALLEST, Array, finite_array, number, number_or_none, shown
 from ..bayes.kernel import LENGTHS
 from ..bayes.posterior import SurfacePosterior, terms_to
 from ..bayes.prior import FREE
@@ -185,13 +185,12 @@ def _taps(d: Any) -> Taps | None:
     if d is None:
         return None
     taps, missed = (int(number(name, _value(d, name), least=0.0)) for name in ("number", "missed"))
-    off, missing, height = _value(d, "off"), d.get("missing", 0.0), d.get("height")
     return Taps(
         taps,
         missed,
-        number("off", off, least=0.0),
-        number("missing", missing, least=0.0),
-        None if height is None else number("height", height, least=0.0),
+        number("off", _value(d, "off"), least=0.0),
+        number("missing", d.get("missing", 0.0), least=0.0),
+        number_or_none("height", d.get("height"), least=0.0),
     )
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..bayes.joint_fit import MISFIT
+from ..contours.common_point import MAX_OFFSET
 from ..contours.contour import SURFACE_ENDS, Contour
 from ..contours.curves import (
     LEAST_CONTACTS,
@@ -31,7 +32,6 @@ from ..patch.domain import AT_POINT, Domain, closed_spline_domain
 from .options import FitOptions
 from .strokes import STRIPS, FirstFrame, first_frame, means, toward_farthest
 
-AWAY = 0.1  # Beyond this share of a curve's size, the point is not on it.
 TOUCH_ROUNDING = 1e-3  # Far from the origin rounding may take this share of a touch; MISFIT has room for it.
 
 
@@ -160,7 +160,7 @@ def _errors(
 
 
 def away_from(point: Array, contours: Sequence[Contour]) -> DegenerateCurvesError | None:
-    """The error that names the curve which passes the point farthest off, if it is AWAY; else None.
+    """The error that names the curve which passes the point farthest off, if it is by MAX_OFFSET; else None.
 
     Both its nearest contact and its line there are, because at a corner only the line is. Too few curves or
     contacts have other errors.
@@ -169,7 +169,7 @@ def away_from(point: Array, contours: Sequence[Contour]) -> DegenerateCurvesErro
         return None
     distances = misses(curves_through(*stacked(point[None], [contours])))[0, :, 0]
     away = [
-        miss if min(contour.distance_to(point), miss) > AWAY * contour.size else 0.0
+        miss if min(contour.distance_to(point), miss) > MAX_OFFSET * contour.size else 0.0
         for miss, contour in zip(distances, contours, strict=True)
     ]
     worst = int(np.argmax(away))

@@ -11,7 +11,7 @@ import numpy as np
 from ..arguments import Array
 from ..bayes.posterior import CONFIDENCE, SurfacePosterior
 from ..contours.contour import SURFACE_ENDS, UNEXPLAINED, Contour, unit_normals
-from ..verdict import FROM_EDGE, LONGER, SHORTER, SUBDIVIDE, Doubt, beyond
+from ..verdict import FROM_EDGE, LONGER, SHORTER, SIGNIFICANT, SUBDIVIDE, Doubt, beyond
 
 # A fit is in doubt beyond these. benchmarks.stability chose them, benchmarks.real LIKELY and those of taps.
 DOUBTFUL_STD = 0.02  # Mean deviation of the height over the domain, as a share of the radius.
@@ -23,8 +23,7 @@ DOUBTFUL_CURVATURE = 0.1  # Deviation of a curvature times the radius: that of c
 # Mean curvature times the radius of a curve of few bends (benchmarks.curvatures: folds of 15 and 20 degrees).
 # With less, a default cylinder is in doubt at its rim.
 DOUBTFUL_FOLD = 0.2
-# A curve misses the point if it is off by more than this share of the radius and by SIGNIFICANT deviations.
-DOUBTFUL_MISS, SIGNIFICANT = 0.005, 5.0
+DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve misses the point, if it is SIGNIFICANT as well.
 OWN_POINT = 1e-6  # A contact that is nearer to the point, in unit radius, is the point.
 # Scatter counts as at least this share of a contact's noise: few contacts may scatter less.
 LEAST_SCATTER = 0.3

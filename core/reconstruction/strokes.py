@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arguments import LARGEST, SMALLEST, Array, finite_array, list_of, many
+from ..arguments import DECIMALS, LARGEST, SMALLEST, Array, finite_array, list_of, many
 from ..bayes.joint_fit import frame_update
 from ..contours.contour import Contour, cross, equal_points
 from ..contours.local_geometry import DegenerateCurvesError
@@ -31,7 +31,6 @@ UNDETERMINED = 1e-3  # Terms of a quartic below this share of the largest singul
 # Contacts that are farther away than all others by this factor do not belong to the surface, if they are at
 # most this share of all.
 STRAY_FACTOR, STRAY_SHARE = 2.0, 0.02
-DECIMALS = 9  # Places of contacts are compared to this decimal, so that rounding does not choose.
 
 
 class FirstFrame(NamedTuple):
