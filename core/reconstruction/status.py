@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import Array
+from ..bayes.normals import SLOPE_MISFIT
 from ..bayes.posterior import CONFIDENCE, SurfacePosterior
 from ..contours.contour import SURFACE_ENDS, UNEXPLAINED, Contour, unit_normals
 from ..verdict import FROM_EDGE, LONGER, SHORTER, SIGNIFICANT, SUBDIVIDE, Doubt, beyond
@@ -27,8 +28,6 @@ DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve misses the point, 
 OWN_POINT = 1e-6  # A contact that is nearer to the point, in unit radius, is the point.
 # Scatter counts as at least this share of a contact's noise: few contacts may scatter less.
 LEAST_SCATTER = 0.3
-# Angle in radians by which normals contradict the contacts, if it is SIGNIFICANT as well.
-CONTRADICTED = 0.01
 # Angle in radians by which normals are off the curves, and the least multiple of their deviation that it is.
 SCATTERED, SCATTERED_DEVIATIONS = 0.15, 3.0
 CONTRADICTING_CURVE = 7.0  # Deviations by which half of a curve is off what the others show.
@@ -123,8 +122,8 @@ def about_point(
 def about_normals(contradiction: tuple[float, float], scatter: tuple[float, float]) -> Iterator[Doubt]:
     """Whether measured normals contradict the contacts: numbers of deviations, and angles in radians."""
     deviations, angle = contradiction
-    if deviations > SIGNIFICANT and angle > CONTRADICTED:
-        yield Doubt("normals", angle, max(CONTRADICTED, SIGNIFICANT * angle / deviations))
+    if deviations > SIGNIFICANT and angle > SLOPE_MISFIT:
+        yield Doubt("normals", angle, max(SLOPE_MISFIT, SIGNIFICANT * angle / deviations))
     deviations, angle = scatter
     if deviations > SCATTERED_DEVIATIONS and angle > SCATTERED:
         explained = max(SCATTERED, SCATTERED_DEVIATIONS * angle / deviations)
