@@ -22,7 +22,6 @@ from .contours.contour import (
     EXTENT,
     NO_CONTACT,
     NOT_MONGE,
-    UNEXPLAINED,
     WHERE,
     Contour,
     SamplingPlane,
@@ -39,11 +38,11 @@ from .exploration.taps import MeshError, doubts_by_mesh, mesh_error
 from .exploration.touches import explore, explore_many
 from .paper.by_method import SOLVERS
 from .patch.domain import Domain
-from .patch.geometry import Geometry, distances, fit_error, overlapped
+from .patch.geometry import Geometry, distances, fit_error
 from .patch.monge import MongePatch
 from .reconstruction.deviations import gaussian_curvature_stds
 from .reconstruction.from_contours import reconstruct, reconstruct_many
-from .reconstruction.next_plane import azimuth_of, suggest_plane
+from .reconstruction.next_plane import suggest_plane
 from .reconstruction.options import METHODS
 from .reconstruction.result import Reconstruction
 from .reconstruction.serialization import from_dict, to_dict
@@ -52,28 +51,13 @@ from .scan.face_orientation import DOUBLED, INWARD, open_edge_distance, orientat
 from .scan.pose_search import Pose, register
 from .scan.sampling import scattered, spaced, spaced_count
 from .scan.verification import reachable, verify, verifying
-from .verdict import FINER, OK, SHORTER_EDGES, SUBDIVIDE, UNCERTAIN, Doubt, status_of
+from .verdict import FINER, SHORTER_EDGES, SUBDIVIDE, Doubt, status_of
 
 __version__ = "0.1.0"  # That of blender_manifest.toml; python -m tools.release compares them.
+# What a script may rely on, as docs/reference.md describes it. The other names are for the add-on.
 __all__ = [
-    "CONTRADICTING",
-    "CREASE",
-    "DOUBLED",
-    "DOUBTFUL_STD",
-    "EXTENT",
-    "FINER",
-    "INWARD",
     "METHODS",
-    "NOT_MONGE",
-    "NO_CONTACT",
-    "OK",
-    "SHORTER_EDGES",
     "SOLVERS",
-    "SUBDIVIDE",
-    "UNCERTAIN",
-    "UNEXPLAINED",
-    "UNIT_METERS",
-    "WHERE",
     "Atlas",
     "Contacts",
     "Contour",
@@ -82,7 +66,6 @@ __all__ = [
     "Doubt",
     "Edge",
     "Exploration",
-    "ExplorationOptions",
     "Frame",
     "Geometry",
     "Mesh",
@@ -95,45 +78,26 @@ __all__ = [
     "SamplingPlane",
     "Surface",
     "atlas_of",
-    "azimuth_of",
     "common_point",
     "contacts_from_csv",
     "contacts_to_csv",
     "cover_contacts",
-    "covered_by",
     "distances",
-    "doubts_by_mesh",
-    "expected_touches",
     "explore",
     "explore_many",
     "explore_object",
-    "exploring_many",
     "fit_error",
     "from_dict",
-    "gaussian_curvature_stds",
     "in_running_order",
-    "is_beside_bend",
     "mesh_error",
-    "open_edge_distance",
-    "orientation_fault",
-    "overlapped",
-    "reachable",
     "reconstruct",
     "reconstruct_many",
     "register",
     "scattered",
-    "shortest_edge",
     "spaced",
-    "spaced_count",
-    "status_of",
-    "stops_at",
     "suggest_plane",
-    "thinnest_wall",
     "to_dict",
     "touch_all_over",
     "track",
     "verify",
-    "verifying",
-    "vertices_shown",
-    "with_facets",
 ]

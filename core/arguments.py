@@ -5,7 +5,7 @@
 import math
 import reprlib
 from collections.abc import Iterable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 T = TypeVar("T")
 UNIT_ROUNDING = 4e-16  # Rounding changes a unit vector's length by at most this.
+DECIMALS = 9  # Shares are compared to this decimal, so that rounding does not choose.
 LARGEST, SMALLEST = 1e50, 1e-50  # The sixth powers of lengths between these are finite numbers.
 
 
@@ -47,6 +48,11 @@ def finite_array(
             f"{name}: expected numbers up to {largest:g}, got larger ones: use another unit of length"
         )
     return array
+
+
+def set_fields(instance: object, **values: Any) -> None:
+    """Writes checked values into fields of a frozen dataclass, whose own __setattr__ raises."""
+    vars(instance).update(values)
 
 
 def list_of(name: str, values: Iterable[T], kind: type[T]) -> list[T]:
@@ -124,6 +130,13 @@ def number(name: str, value: float, *, above: float | None = None, least: float 
     if above == 0.0 and result < SMALLEST:
         raise ValueError(f"{name}: expected a number of {SMALLEST:g} or more, got {result:g}")
     return result
+
+
+def number_or_none(
+    name: str, value: float | None, *, above: float | None = None, least: float | None = None
+) -> float | None:
+    """None for None, and for a value what `number` returns."""
+    return None if value is None else number(name, value, above=above, least=least)
 
 
 def _number_text(above: float | None, least: float | None) -> str:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
+SIGNIFICANT = 5.0  # Noise does not explain what is off by more standard deviations (benchmarks.stability).
 OK, UNCERTAIN, NOT_CONVERGED = "ok", "uncertain", "not_converged"  # Each status.
 
 SHORTER, LONGER, PLANES = "use a shorter extent", "use a longer extent", "add sampling planes"
@@ -221,10 +222,10 @@ class Doubt:
     """A reason to doubt a result.
 
     code : of REASONS
-    value, limit : what was found, and the value up to which there is no doubt: shares, angles in radians,
+    value, limit : the value in doubt, and the one up to which there is no doubt: shares, angles in radians,
         numbers, or lengths in the caller's unit
     words : what else its sentence has: a place, a count, a length in its unit
-    useless : advice of its reason that does not apply, as what the touch has tried by itself
+    useless : advice of its reason that does not apply, as what the touch has tried already
     """
 
     code: str
@@ -299,7 +300,7 @@ class Judged(ABC):
 
     @cached_property
     def gravest(self) -> Doubt | None:
-        """The gravest doubt, or None; the others are not looked for, which would take longer."""
+        """The gravest doubt, or None; the others are not computed, which would take longer."""
         return next(self._doubting(), None)
 
     @property

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from core import verdict
 from core.atlas import curvature, expected, object_atlas, samples, touching
 from core.atlas import measured as atlas_measured
 from core.bayes import bends, evidence, joint_fit, kernel, posterior, prior, process_fit
@@ -69,14 +70,14 @@ PROMISES = [
     ("methods", "by more than # times their noise", process_fit.UNEXPLAINED_MISFIT),
     ("methods", "a surface with g has odds of a fifth or more", 5 * evidence.ODDS),
     ("methods", "median of those distances is more than # % of the radius", 100 * joint_fit.MISFIT),
-    ("methods", "$(# / M)^3$ of what", bends.FEW),
+    ("methods", "$(# / M)^3$ of what", bends.FEW_BENDS),
     ("methods", "at # places all over the patch", 6 * domain.GAUSS_ALONG * (domain.GAUSS_ACROSS + 1)),
     ("methods", "if one tap is off by more than ten standard deviations", taps.TOO_FAR_OFF / 10),
     ("methods", "all are by more than two on average", status.CONTRADICTING / 2),
     ("methods", "if more than # % of its area has no surface", 100 * status.DOUBTFUL_GAP),
     ("methods", "each a sixth shorter", round(1 / (1 - 0.5 ** (1 / extent.RUNGS))) / 6),
     ("methods", "At most one in a hundred contacts is off it by more than five", 100 * explained.FEW),
-    ("methods", "off it by more than five deviations", explained.TOO_FAR / 5),
+    ("methods", "off it by more than five deviations", verdict.SIGNIFICANT / 5),
     ("methods", "at most # % of the radius in the mean", 100 * extent.TAPS_OFF),
     ("methods", "left after three rounds", touching.AGAIN / 3),
     ("methods", "within # of the radius, a linear map", posterior.QUARTIC_SHARE),

@@ -16,28 +16,30 @@ from numpy.typing import NDArray
 
 from ..arguments import SMALLEST, Array
 from ..contours.contour import Contour
+from ..contours.curves import RIDGE
 from ..contours.local_geometry import Frame
+from ..verdict import SIGNIFICANT
 
-# M bends, or LEAST if there are fewer, show a curvature to the share (FEW / M)^3. Fewer than FEW are those of
-# folds or facets (benchmarks.curvatures: folds, tips of cones; a cylinder of 24 facets has more). With 3 and
-# 2, curvatures across folds without normals are off by over five deviations.
-FEW, LEAST = 3.5, 3.0
-AROUND = 9  # The steps around one whose median rate of turning is even: two folds are in up to four of them.
-FOLDED = 3.0  # A fold by an angle a bends a patch by up to 3 a / L, if it is next to the point.
-EXPLAINED = 5.0  # Turns that are off even ones by fewer deviations are explained by noise.
-CHORDS = 24  # A curve without normals has at most this number of chords, as a touch has steps.
-SHORT = 0.1  # Steps count as this share of the mean at least: contacts in one place are no fold.
-RIDGE = 1e-12  # It is added to the equations of x^2, xy and y^2, because outliers may leave two curves.
-FLAT = 1e-6  # A curve whose normals turn by less, in radians, turns by rounding.
+# M bends, or LEAST_BENDS if there are fewer, show a curvature to the share (FEW_BENDS / M)^3. Fewer than
+# FEW_BENDS are those of folds or facets (benchmarks.curvatures: folds, tips of cones; a cylinder of 24 facets
+# has more). With 3 and 2, curvatures across folds without normals are off by over five deviations.
+FEW_BENDS, LEAST_BENDS = 3.5, 3.0
+STEPS_AROUND = (
+    9  # The steps around one whose median rate of turning is even: two folds are in up to four of them.
+)
+FOLD_BEND = 3.0  # A fold by an angle a bends a patch by up to 3 a / L, if it is next to the point.
+MOST_CHORDS = 24  # A curve without normals has at most this number of chords, as a touch has steps.
+SHORT_STEP = 0.1  # Steps count as this share of the mean at least: contacts in one place are no fold.
+ROUNDED_TURN = 1e-6  # A curve whose normals turn by less, in radians, turns by rounding.
 
 
 class Bends(NamedTuple):
     """How unevenly a surface bends along curves.
 
     second : (3, c), the second derivatives of x^2, xy and y^2 along each of c curves
-    stds : (c,), deviations of the curvatures along these for want of bends, in unit radius
+    stds : (c,), deviations of the curvatures along these that too few bends leave, in unit radius
     contacts : how many contacts share a bend, 1 or more
-    folded : the largest mean curvature beyond even ones of a curve of fewer than FEW bends, in unit radius
+    folded : the largest mean curvature beyond even ones of a curve of fewer than FEW_BENDS, in unit radius
     """
 
     second: Array
@@ -47,8 +49,9 @@ class Bends(NamedTuple):
 
     @property
     def covariance(self) -> Array:
-        """The covariance (3, 3) of the coefficients of x^2, xy and y^2 in unit radius, for want of bends."""
+        """The covariance (3, 3) of the coefficients of x^2, xy and y^2, in unit radius, from few bends."""
         second = self.second
+        # Outliers may leave two curves.
         inverse = np.linalg.solve(second @ second.T + RIDGE * np.eye(3), second)
         covariance: Array = (inverse * self.stds**2) @ inverse.T
         return covariance
@@ -132,9 +135,9 @@ def _chords(
 ) -> tuple[NDArray[np.intp], Array, Array, Array]:
     """Curves, middles, angles and their deviations, (m,), of the chords between contacts (n,) in order."""
     last = np.bincount(curve) - 1
-    if last.max() > CHORDS:
+    if last.max() > MOST_CHORDS:
         rank, last = np.arange(len(curve)) - curve.searchsorted(curve), last[curve]
-        chosen = rank * CHORDS // last > (rank - 1) * CHORDS // last
+        chosen = rank * MOST_CHORDS // last > (rank - 1) * MOST_CHORDS // last
         curve, along, heights = curve[chosen], along[chosen], heights[chosen]
     first, second = _neighbors(curve)
     lengths = np.maximum(along[second] - along[first], SMALLEST)
@@ -158,20 +161,20 @@ def _even(of: _Turns) -> Array:
     from scipy.ndimage import median_filter
 
     rates, ends = of.turns / np.maximum(of.steps, SMALLEST), np.bincount(of.curve).cumsum()[:-1]
-    return np.concatenate([median_filter(own, AROUND, mode="mirror") for own in np.split(rates, ends)])
+    return np.concatenate([median_filter(own, STEPS_AROUND, mode="mirror") for own in np.split(rates, ends)])
 
 
 def _unexplained(of: _Turns, beyond: Array) -> Array:
-    """The turns (m,) beyond even ones, without those that noise explains, alone and with either neighbor."""
+    """The turns (m,) beyond even ones; 0 where noise explains a turn and its sums with either neighbor."""
     stds = np.maximum(of.stds, 1e-300)
     pairs = np.abs(beyond[1:] + beyond[:-1]) * (of.curve[1:] == of.curve[:-1])
     pairs /= np.maximum(stds[1:], stds[:-1])
     off = np.maximum.reduce([np.abs(beyond) / stds, np.append(pairs, 0.0), np.append(0.0, pairs)])
-    return np.where(off > EXPLAINED, beyond, 0.0)
+    return np.where(off > SIGNIFICANT, beyond, 0.0)
 
 
 def _with_neighbors(of: _Turns, turns: Array, beyond: Array) -> Array:
-    """Those turns (m,) beyond even ones that noise does not explain, `beyond` (m,), and those beside them.
+    """Those turns (m,) beyond even ones that noise does not explain, `beyond` (m,), and their neighbors.
 
     A contact that is off turns chords one way, twice as far back, and again, which is no bend; noise may
     explain the lesser ones.
@@ -182,7 +185,7 @@ def _with_neighbors(of: _Turns, turns: Array, beyond: Array) -> Array:
 
 
 def _without_outliers(of: _Turns, turns: Array) -> Array:
-    """The turns (m,) of medians of three angles: one contact alone that turns and back is an outlier."""
+    """The turns (m,) of medians of three angles: a single contact that turns there and back is an outlier."""
     before, after = -turns[:-1], turns[1:]
     medians = np.maximum(np.minimum(before, after), np.minimum(np.maximum(before, after), 0.0))
     moved = medians * (of.curve[1:] == of.curve[:-1])
@@ -194,8 +197,10 @@ def _counted(of: _Turns, turns: Array) -> tuple[Array, Array]:
     curve, number = of.curve, np.bincount(of.curve)
     length = np.maximum(np.bincount(curve, of.steps), SMALLEST)
     turned = np.asarray(np.bincount(curve, np.abs(turns)), dtype=float)
-    squares = np.bincount(curve, turns**2 / np.maximum(of.steps, (SHORT * length / number)[curve]))
-    bends: Array = np.where(turned > FLAT, number * turned**2 / np.maximum(length * squares, 1e-300), number)
+    squares = np.bincount(curve, turns**2 / np.maximum(of.steps, (SHORT_STEP * length / number)[curve]))
+    bends: Array = np.where(
+        turned > ROUNDED_TURN, number * turned**2 / np.maximum(length * squares, 1e-300), number
+    )
     return turned, bends
 
 
@@ -212,5 +217,5 @@ def _bends(of: _Turns) -> Array:
     net = np.bincount(curve, _with_neighbors(of, of.turns - around, beyond))
     mean = np.abs(net) / np.maximum(np.bincount(curve, of.steps), SMALLEST)
     at_point = np.lexsort((np.abs(of.middles), curve))[number.cumsum() - number]
-    shares = (FEW / np.maximum(few, LEAST)) ** 3
-    return np.array([*of.toward.T, turned, contacts, shares, mean, FOLDED * most, even[at_point]])
+    shares = (FEW_BENDS / np.maximum(few, LEAST_BENDS)) ** 3
+    return np.array([*of.toward.T, turned, contacts, shares, mean, FOLD_BEND * most, even[at_point]])

@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import Array
+from ..arguments import DECIMALS, Array
 from ..contours.contour import along, cross, dot, scaled
 from ..contours.local_geometry import UMBILIC
+from ..verdict import SIGNIFICANT
 from .evidence import Hyperparameters
 from .posterior import SurfacePosterior
 from .prior import FREE, USUAL_VARIANCES, prior_mean
@@ -24,14 +25,12 @@ from .sextic import Sextics, mean_given, posterior_given, sextics, with_scatter
 # The noise is at least this share of the radius, because no surface is a polynomial. With less the waviness
 # follows what polynomials leave, and automatic touches end earlier (benchmarks.model, e20b52a).
 MISFIT = 2e-3
-# benchmarks.accuracy judges these, and the outliers of benchmarks.stability the last two.
+# benchmarks.accuracy judges these, and the outliers of benchmarks.stability the last.
 # The largest number of passes: two turn the frame to what they found, others are for outliers.
 PASSES = 8
 SETTLED_WEIGHT = 0.1  # A fit is settled when no weight changes by more between passes.
 ALIKE_CURVATURES = 1e-4  # Curvatures that differ by less count as alike; heights change by an eighth of it.
 LEVEL = 5e-3  # Axes are level when the slope is less: heights change by its product with slope and height.
-DECIMALS = 9  # Heights and distances are compared to this decimal, so that rounding does not choose.
-OUTLYING = 5.0  # A contact off by more standard deviations is an outlier.
 STUDENT = 4.0  # Outliers weigh as under a Student t distribution of this many degrees of freedom.
 
 
@@ -67,6 +66,10 @@ class _State(NamedTuple):
     prior: Array
     noise: Array
 
+    def at(self, which: NDArray[np.bool_]) -> "_State":
+        """The state of some of the touches."""
+        return _State._make(values[which] for values in self)
+
 
 def joint_fit(
     given: Observations, weights: Array, k1: Array, k2: Array
@@ -78,29 +81,27 @@ def joint_fit(
 
     Returns the columns d1, d2, n (b, 3, 3) in the frame given, the posteriors in the new one, where
     the means of the slopes and of the mixed second derivative are 0, and the weights (b, n) that the
-    contacts have in the end: where one is beyond OUTLYING standard deviations, they weigh as under a
+    contacts have in the end: where one is beyond SIGNIFICANT standard deviations, they weigh as under a
     Student t distribution.
     """
-    floor = np.maximum(given.noise, MISFIT)
+    given = given._replace(noise=np.maximum(given.noise, MISFIT))
     usual = USUAL_VARIANCES[None].repeat(len(k1), axis=0)
-    state = _State(_first_axes(given.contacts, weights, k1, k2), k1, k2, weights, usual, floor)
-    return _passes(given._replace(noise=floor), state, 0)
-
-
-def _passes(given: Observations, state: _State, step: int) -> tuple[Array, SurfacePosterior, Array]:
-    """What `joint_fit` gives, from a pass on."""
-    state, settled, surface = _pass(given, state, step)
-    if surface is None:
-        return _passes(given, state, step + 1)
-    settled_state, left = (state.axes, surface, state.weights), ~settled
-    if left.any():
-        rest = _passes(given.at(left), _State(*(v[left] for v in state)), step + 1)
-        arrays = (
-            (axes, of.mean, of.root, of.noise, of.visibility, w) for axes, of, w in (settled_state, rest)
-        )
-        for whole, part in zip(*arrays, strict=True):
-            whole[left] = part
-    return settled_state
+    state = _State(_first_axes(given.contacts, weights, k1, k2), k1, k2, weights, usual, given.noise)
+    results: list[Array] = []
+    active = np.arange(len(k1))  # The touches that are not settled yet.
+    for step in range(PASSES):
+        state, settled, of = _pass(given, state, step)
+        if of is None:
+            continue
+        arrays = [state.axes, of.mean, of.root, of.noise, of.visibility, state.weights]
+        results = results or arrays
+        for result, array in zip(results, arrays, strict=True):
+            result[active] = array
+        if settled.all():
+            break
+        active, given, state = active[~settled], given.at(~settled), state.at(~settled)
+    axes, mean, root, noise, visibility, weights = results
+    return axes, SurfacePosterior(mean, root, noise, visibility), weights
 
 
 def _first_axes(contacts: Array, weights: Array, k1: Array, k2: Array) -> Array:
@@ -155,7 +156,7 @@ def _pass(
 
 
 def _hyperparameters(state: _State, data: Sextics, floor: Array, step: int) -> Hyperparameters:
-    """Waviness and noise, which are found anew after the first pass and while there are outliers."""
+    """Waviness and noise, which are estimated anew after the first pass and while contacts are outliers."""
     stale = ((state.weights > 0.0) & (state.weights < 1.0)).any(axis=1) | (step == 1)
     if not stale.any():
         return Hyperparameters(state.prior, state.noise)
@@ -194,9 +195,9 @@ def posteriors_of(
 def _student_weights(residuals: Array, present: NDArray[np.bool_], floor: Array) -> Array:
     """Weights of the contacts, (b, n): all 1 if none of a touch is outlying, 0 where there is no contact."""
     misses, weights = np.abs(residuals), present.astype(float)
-    for i in np.flatnonzero((present & (misses > OUTLYING * floor[:, None])).any(axis=1)):
+    for i in np.flatnonzero((present & (misses > SIGNIFICANT * floor[:, None])).any(axis=1)):
         ratios = misses[i] / max(floor[i], 1.4826 * float(np.median(misses[i][present[i]])))
-        if ratios[present[i]].max() > OUTLYING:
+        if ratios[present[i]].max() > SIGNIFICANT:
             weights[i] *= (STUDENT + 1.0) / (STUDENT + ratios**2)
     return weights
 

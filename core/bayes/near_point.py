@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the contacts near the point, by themselves, show other curvatures than the patch has.
+"""Whether the contacts near the point show other curvatures than the patch has.
 
 Not in the paper. A patch has the curvatures of a quartic over QUARTIC_SHARE of the radius. Where a tip or a
 fold bends the patch, the quartic of least squares of the contacts within this share has other ones.
@@ -13,14 +13,14 @@ from ..patch.monge import TERMS, monomials
 from .posterior import QUARTIC_SHARE, SurfacePosterior, bent, normal_curvature_variances, terms_to
 from .prior import FREE
 
-INVISIBLE = 1e-12  # Directions that contacts show less, as a share of all squares, are invisible.
-ENOUGH = 1.5  # The least number of contacts, as a multiple of the rank, that shows what a quartic leaves.
+INVISIBLE = 1e-12  # Directions with a smaller share of the sum of squares are invisible.
+CONTACTS_PER_RANK = 1.5  # The least number of contacts, as a multiple of the rank, that shows residuals.
 
 
 def curvature_contradiction(contacts: Array, posterior: SurfacePosterior, covariance: Array) -> float:
     """The deviations, at most, by which a normal curvature is off that of the contacts near the point.
 
-    contacts : (n, 3), besides the reference point, in the frame and in unit radius
+    contacts : (n, 3), without the reference point, in the frame and in unit radius
     posterior : of all contacts; covariance : (3, 3), of its coefficients of x^2, xy and y^2
 
     It is 0 if there are too few contacts to judge.
@@ -32,7 +32,7 @@ def curvature_contradiction(contacts: Array, posterior: SurfacePosterior, covari
     gram = basis.T @ basis
     inverse = np.linalg.inv(gram + INVISIBLE * gram.trace() * np.eye(len(gram)))
     rank = float((inverse * gram).sum())
-    if len(near) < ENOUGH * rank:
+    if len(near) < CONTACTS_PER_RANK * rank:
         return 0.0
     solution = inverse @ basis.T
     quartic, rows = solution @ near[:, 2], solution[2:FREE]

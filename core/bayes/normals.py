@@ -6,10 +6,10 @@ The measured unit normal m is off the surface's normal (-z_x, -z_y, 1) by no mor
 be unit vectors across m and each other: a . (-z_x, -z_y, 1) and b . (-z_x, -z_y, 1) are 0, except for an
 error of |(z_x, z_y, 1)| times the deviation of m. Both are linear in the coefficients.
 
-Contacts by themselves show the surface's slopes and second derivatives at the point, and so do normals. The
+Contacts without normals show the surface's slopes and second derivatives at the point, and so do normals. The
 difference is judged by the deviations of both. The normals of a texture scatter about the patch by more than
 their deviation, which is no contradiction; so their scatter counts as deviation too. Along the curves,
-though, contacts show a texture as normals do: normals that scatter widely there are wrong.
+though, contacts show a texture as normals do: normals that scatter widely along them are wrong.
 """
 
 import math
@@ -25,7 +25,7 @@ from ..patch.monge import PARTIALS, TERMS, derived_monomials
 from .posterior import SurfacePosterior
 from .prior import FREE
 
-# No slope is known better than this angle, because no surface is a polynomial (benchmarks.stability).
+# Slopes have at least this error, an angle, because no surface is a polynomial (benchmarks.stability).
 SLOPE_MISFIT = 1e-2
 
 

@@ -247,7 +247,7 @@ class SurfacePosterior(HeightField):
     def is_round(self) -> bool:
         """Whether the surface may be a sphere or a plane, judged by its terms to degree 3 with CONFIDENCE.
 
-        Then there are no principal directions. It is False if curvatures are not known to ALIKE, or to
+        Then there are no principal directions. It is False if curvatures are less certain than ALIKE, or than
         ALIKE_SHARE of their mean.
         """
         xx, _, yy = self.polynomial[2:FREE].tolist()

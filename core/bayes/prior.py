@@ -7,7 +7,7 @@ the curvature changes over a length l it has the size l^(1 - i - j), so its prio
 
     b_ij ~ N(m_ij, (waviness^(i + j - 1) / 10)^2)    with waviness = L / l.
 
-m are the quartic and sextic of a surface that goes on with the curvatures it has at the point.
+m are the quartic and sextic of a surface that keeps the curvatures it has at the point.
 """
 
 import numpy as np
@@ -32,18 +32,18 @@ USUAL_VARIANCES = prior_variances(np.array(USUAL_WAVINESS))
 
 
 def prior_mean(k1: Array, k2: Array) -> Array:
-    """The prior's mean, (b, 27): the quartic and sextic of a surface that goes on with its curvatures (b,).
+    """The prior's mean, (b, 27): the quartic and sextic of a surface that keeps its curvatures (b,).
 
     With Q = (k1 x^2 + k2 y^2) / 2 and G = |grad Q|^2 they are Q G / 4 and Q G^2 / 8, as on a sphere and a
     cylinder. The coefficient of x^2 y^2 is k1 k2^2 / 4 on a torus whose parallels have the curvature k2 at
     the point, and k1^2 k2 / 4 if they have k1: the prior takes the mean of both.
     """
-    return np.array([_going_on(*pair) for pair in zip(k1.tolist(), k2.tolist(), strict=True)])
+    return np.array([_mean_of_one(*pair) for pair in zip(k1.tolist(), k2.tolist(), strict=True)])
 
 
-def _going_on(k1: float, k2: float) -> list[float]:
+def _mean_of_one(k1: float, k2: float) -> list[float]:
     """The prior's mean of one surface, in Python floats."""
-    # No surface goes on with a radius of curvature below L.
+    # No surface keeps a radius of curvature below L.
     k1, k2 = min(max(k1, -1.0), 1.0), min(max(k2, -1.0), 1.0)
     a, b = k1**2, k2**2
     mean = [0.0] * len(TERMS)

@@ -31,7 +31,7 @@ UNEXPLAINED_MISFIT = 1.3  # A sextic does not explain contacts that are off it b
 MOST_PLACES = 150  # At most about this many contacts carry a process and show how large it is.
 
 
-class Touch(NamedTuple):
+class ProcessData(NamedTuple):
     """The equations of a touch with a process, in unit radius and in a frame near to its Darboux frame.
 
     contacts : (n, 3); roots : (n,), of their weights; normals : (n, 3), or (0, 3) without
@@ -48,22 +48,22 @@ class Touch(NamedTuple):
     kernels: list[Array]
 
     def at_places(self) -> tuple[Array, list[Array]]:
-        """Terms and heights (28, m), and kernels (m, m), of the places, each times the root of its weight."""
+        """Terms and heights (28, m), and kernels (m, m), of the places, times the roots of their weights."""
         at, root = self.places, self.roots[self.places]
         within = self.kernels if len(at) == len(self.roots) else [k[at] for k in self.kernels]
         if root.min() < 1.0:  # In most cases there is none, and this saves a copy.
             within = [root[:, None] * k * root for k in within]
         return np.vstack([self.basis[at].T, self.contacts[at, 2]]) * root, within
 
-    def moved(self, turn: Array, scale: float) -> "Touch":
-        """This touch in the axes `turn` (3, 3), with lengths divided by `scale`."""
-        return touch_of(self.contacts @ turn / scale, self.roots, self.normals @ turn, self.places)
+    def moved(self, turn: Array, scale: float) -> "ProcessData":
+        """These equations in the axes `turn` (3, 3), with lengths divided by `scale`."""
+        return process_data(self.contacts @ turn / scale, self.roots, self.normals @ turn, self.places)
 
 
-def touch_of(contacts: Array, roots: Array, normals: Array, places: NDArray[np.intp]) -> Touch:
-    """The equations of a touch."""
+def process_data(contacts: Array, roots: Array, normals: Array, places: NDArray[np.intp]) -> ProcessData:
+    """The equations of a touch with these contacts, roots of weights, normals and places."""
     flat = contacts[:, :2]
-    return Touch(contacts, roots, normals, places, monomials(flat, TERMS), kernels(flat, flat[places]))
+    return ProcessData(contacts, roots, normals, places, monomials(flat, TERMS), kernels(flat, flat[places]))
 
 
 def process_fit(
@@ -90,25 +90,27 @@ def process_fit(
     rms = np.sqrt((weights * off**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0))
     for i in np.flatnonzero(rms > UNEXPLAINED_MISFIT * least):
         present = np.flatnonzero(weights[i])
-        touch = _with_point(given, weights[i], ranks(int(i)), float(offsets[i]), int(i))
-        carried = touch.at_places()
+        data = _with_point(given, weights[i], ranks(int(i)), float(offsets[i]), int(i))
+        carried = data.at_places()
         hyper, use_gp = process_hyperparameters(*carried, float(least[i]), float(most[i]))
         if not (use_gp or (given.noise_is_known[i] and _is_texture(off[i, present], float(given.noise[i])))):
             continue
         if rms[i] <= MISFIT:  # The polynomial averages facets, so its frame is kept.
-            fits[i] = replace(process_posterior(touch, hyper, posterior.visibility[i]), sextic=fits[i])
+            fits[i] = replace(process_posterior(data, hyper, posterior.visibility[i]), sextic=fits[i])
             continue
         quartic = nearest_quartic(
-            *_mean_given(touch, hyper, *carried), touch.contacts[touch.places, :2], hyper.process
+            *_mean_given(data, hyper, *carried), data.contacts[data.places, :2], hyper.process
         )
         turns[i] = frame_update(np.eye(3), quartic, given.tangent[i])[0]
-        scales[i] = np.hypot(*(touch.contacts @ turns[i])[:, :2].T).max()
+        scales[i] = np.hypot(*(data.contacts @ turns[i])[:, :2].T).max()
         hyper = hyper._replace(noise=hyper.noise / scales[i], process=hyper.process / scales[i] ** 2)
-        fits[i] = process_posterior(touch.moved(turns[i], scales[i]), hyper, posterior.visibility[i])
+        fits[i] = process_posterior(data.moved(turns[i], scales[i]), hyper, posterior.visibility[i])
     return turns, scales, fits
 
 
-def _with_point(given: Observations, weights: Array, ranks: NDArray[np.intp], offset: float, i: int) -> Touch:
+def _with_point(
+    given: Observations, weights: Array, ranks: NDArray[np.intp], offset: float, i: int
+) -> ProcessData:
     """Touch i of a stack with the reference point, which is a contact like the others.
 
     On facets its residual may be as large. weights, ranks : (n,), those of `process_fit`
@@ -122,7 +124,7 @@ def _with_point(given: Observations, weights: Array, ranks: NDArray[np.intp], of
     rank, n = np.append(ranks[present], 0), len(roots)
     # Places are spread on each half of a curve, whichever way it runs and whichever curve is the first.
     places = np.flatnonzero(rank * min(n, MOST_PLACES) % n < MOST_PLACES)
-    return touch_of(np.vstack([given.contacts[i, present], point]), roots, normals, places)
+    return process_data(np.vstack([given.contacts[i, present], point]), roots, normals, places)
 
 
 def _is_texture(off: Array, noise: float) -> bool:
@@ -134,37 +136,37 @@ def _is_texture(off: Array, noise: float) -> bool:
 
 
 def _mean_given(
-    touch: Touch, hyper: Hyperparameters, rows: Array, kernels: list[Array]
+    data: ProcessData, hyper: Hyperparameters, rows: Array, kernels: list[Array]
 ) -> tuple[Array, Array]:
     """The mean (27,) of the terms, and alpha (m,), of a SurfacePosterior, by one Cholesky factor.
 
     rows, kernels : of `at_places`
     """
-    if len(touch.normals) or len(touch.places) < len(touch.roots):
-        of_process = process_posterior(touch, hyper, np.empty(0))
+    if len(data.normals) or len(data.places) < len(data.roots):
+        of_process = process_posterior(data, hyper, np.empty(0))
         return of_process.mean, of_process.alpha
     matrix = (rows[:-1].T * hyper.prior) @ rows[:-1]
     matrix += hyper.process[0] * kernels[0] + hyper.process[1] * kernels[1]
     matrix.flat[:: len(matrix) + 1] += hyper.noise**2
     solution = solved_definite(matrix, rows[-1])
-    return hyper.prior * (rows[:-1] @ solution), touch.roots * solution
+    return hyper.prior * (rows[:-1] @ solution), data.roots * solution
 
 
-def process_posterior(touch: Touch, hyper: Hyperparameters, visibility: Array) -> SurfacePosterior:
+def process_posterior(data: ProcessData, hyper: Hyperparameters, visibility: Array) -> SurfacePosterior:
     """The posterior of a touch.
 
     The unknowns are the coefficients of the terms and of L^-1 k(u, p), because the latter have the prior
     precision 1, which makes the system well-conditioned.
     """
-    index, terms = touch.places, len(TERMS)
-    to_points = hyper.process[0] * touch.kernels[0] + hyper.process[1] * touch.kernels[1]
+    index, terms = data.places, len(TERMS)
+    to_points = hyper.process[0] * data.kernels[0] + hyper.process[1] * data.kernels[1]
     factor = places_factor(to_points[index])
     # If each contact is a place, the features are the factor itself.
     carried = factor if len(index) == len(to_points) else solved(factor, to_points.T).T
-    features = np.hstack([touch.basis, carried]) * (touch.roots / hyper.noise)[:, None]
-    heights, at = touch.contacts[:, 2] * touch.roots / hyper.noise, touch.contacts[index, :2]
-    if len(touch.normals):
-        slopes, steepness = _slopes(touch, factor, at, hyper.process)
+    features = np.hstack([data.basis, carried]) * (data.roots / hyper.noise)[:, None]
+    heights, at = data.contacts[:, 2] * data.roots / hyper.noise, data.contacts[index, :2]
+    if len(data.normals):
+        slopes, steepness = _slopes(data, factor, at, hyper.process)
         features, heights = np.vstack([features, slopes]), np.append(heights, steepness)
     precision = features.T @ features
     precision.flat[:: len(precision) + 1] += np.append(1.0 / hyper.prior, np.ones(len(index)))
@@ -179,16 +181,16 @@ def process_posterior(touch: Touch, hyper: Hyperparameters, visibility: Array) -
     return posterior
 
 
-def _slopes(touch: Touch, factor: Array, places: Array, variances: Array) -> tuple[Array, Array]:
+def _slopes(data: ProcessData, factor: Array, places: Array, variances: Array) -> tuple[Array, Array]:
     """What measured normals show of the features, as `slope_equations` has it, (2n, 27 + m) and (2n,).
 
     They are derivative observations (Rasmussen and Williams 2006, 9.4) of the surface that the places carry.
     """
-    of_process = derived_kernel(touch.contacts[:, :2], places, variances)[1:3]
+    of_process = derived_kernel(data.contacts[:, :2], places, variances)[1:3]
     carried = solved(factor, of_process.reshape(-1, len(places)).T).T.reshape(of_process.shape)
-    of_terms = derived_monomials(touch.contacts, TERMS, PARTIALS[1:3])
+    of_terms = derived_monomials(data.contacts, TERMS, PARTIALS[1:3])
     partials = np.concatenate([of_terms, carried], axis=2)[:, None]
     (slopes,), (steepness,) = slope_equations(
-        touch.normals[None], touch.contacts[None], touch.roots[None] ** 2, partials
+        data.normals[None], data.contacts[None], data.roots[None] ** 2, partials
     )
     return slopes, steepness

@@ -17,7 +17,7 @@ from ..contours.contour import Contour
 POINT_COLUMNS, NORMAL_COLUMNS = ("x", "y", "z"), ("nx", "ny", "nz")
 THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")  # The comma may be decimal or that of thousands.
 COMMENT_MARKS = ("#", "//")
-LETTERS_AT_ONCE = 1 << 16  # This many letters are read together.
+LETTERS_AT_ONCE = 1 << 16  # This number of letters is read together.
 LONGEST_LINE = 1 << 20  # Lines have at most this many letters, for the words of one take 80 times its memory.
 
 
@@ -25,7 +25,7 @@ class Contacts(NamedTuple):
     """Contact data of one object.
 
     contours : curves through the reference point
-    unit : of all lengths, such as "mm"; "" if it is not known
+    unit : of all lengths, such as "mm"; "" if it is unknown
     point : the reference point, three numbers, or None
     outward : a direction to the outer side, three numbers, or None
     strokes : curves that do not pass through the reference point
@@ -170,7 +170,7 @@ class RowReader:
         return labels, np.array(numbers).reshape(-1, len(self._keys))
 
     def _parse_row(self, at: str, fields: list[str]) -> tuple[str, list[float]]:
-        """The label and the k numbers of a row at the place `at`, with NaN for normals that it has not."""
+        """The label and the k numbers of a row at the place `at`, with NaN for missing normals."""
         if any(fields[self._width :]):
             raise ValueError(
                 f"{at}: expected {self._width} fields, got {len(fields)}: decimal commas need semicolons or "

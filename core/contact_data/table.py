@@ -31,7 +31,7 @@ STROKE = "stroke"  # The names of curves that do not pass through the reference 
 def contacts_from_csv(text: str, name: str = "the table") -> Contacts:
     """The Contacts of a table with the columns curve, x, y, z, with numbers as they are.
 
-    The contacts of each curve are sorted by time, if that is given, and each is there once.
+    The contacts of each curve are sorted by time, if that is given, and repeated ones are kept once.
 
     name : what messages call the text, such as its file's name
 
@@ -47,7 +47,7 @@ def contacts_from_csv(text: str, name: str = "the table") -> Contacts:
         stds = stds * len(contours) if len(stds) == 1 else stds
         if len(stds) != len(contours):
             raise ValueError(f"{name}: expected one {key} or {len(contours)}, one a curve, got {len(stds)}")
-        contours = [_with(name, c, key, std) for c, std in zip(contours, stds, strict=True)]
+        contours = [_with_value(name, c, key, std) for c, std in zip(contours, stds, strict=True)]
     is_stroke = [label.lower().startswith(STROKE) for label in table.labels]
     strokes = tuple(itertools.compress(contours, is_stroke))
     contours = [c for c, stroke in zip(contours, is_stroke, strict=True) if not stroke]
@@ -122,7 +122,7 @@ def _separator(header: str) -> str:
 
 
 def _curve_metadata(contours: list[Contour]) -> dict[str, list[float | None]]:
-    """What is known of contours by key: one number for all of them, or one for each."""
+    """The deviations and balls of contours by key: one number for all of them, or one for each."""
     metadata = {key: [getattr(contour, key) for contour in contours] for key in CURVE_KEYS}
     return {
         key: stds[:1] if len(set(stds)) == 1 else stds
@@ -141,13 +141,13 @@ def _fields(contour: Contour, width: int) -> list[list[Any]]:
     return [point + normal for point, normal in zip(points, normals, strict=True)]
 
 
-def _with(name: str, contour: Contour, key: str, std: float | None) -> Contour:
-    """The contour with this deviation; with one of normals only if it has normals."""
+def _with_value(name: str, contour: Contour, key: str, value: float | None) -> Contour:
+    """The contour with a value of one of CURVE_KEYS; with a deviation of normals only if it has normals."""
     if key == "normal_std" and contour.normals is None:
         return contour
-    known: dict[str, Any] = {key: std}
+    values: dict[str, Any] = {key: value}
     try:
-        return replace(contour, **known)
+        return replace(contour, **values)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
 

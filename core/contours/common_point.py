@@ -22,10 +22,10 @@ from .local_geometry import LEAST_ANGLE, DegenerateCurvesError
 MAX_OFFSET = 0.1  # A curve may miss the point by this share of its size.
 MAX_GAP = 0.25  # Around the point, a curve may have no contacts within this share of its size.
 NEWTON_STEPS = 50  # Gauss-Newton takes at most this many steps; five are the rule.
-MOST_STARTS = 3  # This many starts are tried: curves may come near each other in several places.
-MOST_SEARCHED = 1000  # Starts are looked for among this many contacts of each curve,
-MAX_QUERIES = 10**6  # and among this many distances of a contact from a curve.
-CONTACTS_AROUND = 4 * WINDOW  # This many contacts of a curve are looked at around a point.
+MOST_STARTS = 3  # This number of starts is tried: curves may come near each other in several places.
+# Starts are chosen among this number of contacts of each curve, by this number of distances from curves.
+MOST_SEARCHED, MAX_QUERIES = 1000, 10**6
+CONTACTS_AROUND = 4 * WINDOW  # This number of contacts of a curve shows how it passes a point.
 
 
 def common_point(contours: Sequence[ArrayLike | Contour]) -> tuple[Array, Array]:
@@ -78,7 +78,7 @@ def _starts(contours: Sequence[Contour]) -> Array:
 
     They are contacts with the least sum of squared distances from the nearest contacts of all curves, more
     than 2 MAX_OFFSET of the smallest curve's size from each other. Of very many contacts only some are
-    searched, because Gauss-Newton goes on from there.
+    searched, because Gauss-Newton refines the starts.
     """
     from scipy.spatial import cKDTree
 

@@ -16,6 +16,8 @@ from ..arguments import (
     finite_array,
     list_of,
     number,
+    number_or_none,
+    set_fields,
     shown,
     unit_vector,
     unit_vectors,
@@ -76,16 +78,16 @@ class Contour:
     """A tracked contour: the contacts along one curve through the reference point.
 
     points : (n, 3), in any order, with or without the reference point
-    plane_normal : (3,), normal of the sampling plane, or None if there is none or it is not known
+    plane_normal : (3,), normal of the sampling plane, or None without one or if it is unknown
     normals : (n, 3), the surface normal at each contact, of any length, outward or inward; or None
-    noise : standard deviation of the contacts, or None if it is not known
+    noise : standard deviation of the contacts, or None if it is unknown
     stops : why tracking ended at the first and at the last point, or None
     normal_std : standard deviation of measured normals, in radians, with which "bayes" fits them as slopes;
       None leaves them out. The paper's methods never use them
     ball : radius of a ball whose centers the points are; None if they are contacts
 
-    Repeated contacts, as of a sensor at rest, are there once, with the mean of their normals, because they
-    add no information.
+    Repeated contacts, as of a sensor at rest, are kept once, with the mean of their normals, because they add
+    no information.
 
     Raises ValueError for another shape, for numbers that are not finite, for numbers of single
     precision too far from the origin, and for measured normals without a direction.
@@ -108,15 +110,16 @@ class Contour:
                     f"points: numbers of single precision are {spacing:g} apart here, too coarse for a curve "
                     "of this size: expected coordinates relative to a nearby point, or double precision"
                 )
-        up, normals, std = self.plane_normal, self.normals, self.normal_std
-        vars(self).update(  # __setattr__ of a frozen dataclass raises.
+        up, normals = self.plane_normal, self.normals
+        set_fields(
+            self,
             points=points,
             plane_normal=None if up is None else unit_vector("plane_normal", up),
             normals=None if normals is None else finite_array("normals", normals, (len(points), 3)),
-            noise=None if self.noise is None else number("noise", self.noise, least=0.0),
+            noise=number_or_none("noise", self.noise, least=0.0),
             stops=None if self.stops is None else tuple(list_of("stops", self.stops, str)),
-            normal_std=None if std is None else number("normal_std", std, least=0.0),
-            ball=None if self.ball is None else number("ball", self.ball, above=0.0),
+            normal_std=number_or_none("normal_std", self.normal_std, least=0.0),
+            ball=number_or_none("ball", self.ball, above=0.0),
         )
         if self.stops is not None and len(self.stops) != 2:
             raise ValueError(f"stops: expected two words, got {shown(self.stops)}")
@@ -125,18 +128,18 @@ class Contour:
                 raise ValueError("normal_std: expected the measured normals that it belongs to, got none")
             if not np.abs(self.normals).max(axis=1, initial=0.0).all():
                 raise ValueError("normals: expected directions where normal_std is given, got (0, 0, 0)")
-        self._keep_each_once()
+        self._keep_distinct()
 
-    def _keep_each_once(self) -> None:
-        """Leaves one of each group of equal contacts, the first, with the mean of their normals."""
+    def _keep_distinct(self) -> None:
+        """Keeps the first of each group of equal contacts, with the mean of their normals."""
         order, starts = equal_points(self.points)
         if len(starts) == len(order):
             return
         firsts = np.argsort(order[starts])
-        vars(self)["points"] = self.points[order[starts]][firsts]
+        set_fields(self, points=self.points[order[starts]][firsts])
         if self.normals is not None:
             sums = np.add.reduceat(consistently_oriented(self.normals, order, starts)[order], starts, axis=0)
-            vars(self)["normals"] = sums[firsts]
+            set_fields(self, normals=sums[firsts])
 
     @property
     def size(self) -> float:
@@ -148,17 +151,19 @@ class Contour:
         return float(np.linalg.norm(self.points - point, axis=1).min(initial=np.inf))
 
     def part(self, which: slice | NDArray[Any], stops: tuple[str, str] | None) -> "Contour":
-        """The contour of some of its contacts, or of all in another order, which are known to be valid."""
-        contour = object.__new__(Contour)
+        """The contour of some of its contacts, or of all in another order."""
         normals = None if self.normals is None else self.normals[which]
-        vars(contour).update(vars(self), points=self.points[which], normals=normals, stops=stops)
-        return contour
+        return self._with_valid(points=self.points[which], normals=normals, stops=stops)
 
     def copied(self) -> "Contour":
         """A copy whose arrays cannot be written to."""
-        contour = object.__new__(Contour)
         arrays = {key: read_only(value) for key, value in vars(self).items() if isinstance(value, np.ndarray)}
-        vars(contour).update(vars(self) | arrays)
+        return self._with_valid(**arrays)
+
+    def _with_valid(self, **values: Any) -> "Contour":
+        """The contour with other values, which are valid, so that none is checked again."""
+        contour = object.__new__(Contour)
+        set_fields(contour, **vars(self) | values)
         return contour
 
     def moved(self, scale: float, turn: Array, start: Array, end: Array) -> "Contour":

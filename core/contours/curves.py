@@ -14,8 +14,8 @@ from .contour import Contour
 # This many contacts are "very close to p" (benchmarks.accuracy). The number is even, because a cubic term
 # does not bend a quadratic over equal sides.
 WINDOW = 10
-LEAST_CONTACTS = 3  # A contour has more than the quadratic's two unknowns, besides the reference point.
-RIDGE = 1e-12  # This share is added to the equations of r0, r1 and r2, because all s may be the same.
+LEAST_CONTACTS = 3  # A contour has more than the quadratic's two unknowns, without the reference point.
+RIDGE = 1e-12  # This is added to equations that may not determine all their unknowns.
 MIN_NORMAL_STD = 1e-6  # Measured normals have at least this deviation, in radians.
 
 
@@ -141,6 +141,7 @@ def local_curves(curves: Curves) -> tuple[Array, Array]:
     scale = np.where(determined, longest, 1.0)[:, None]
     basis = (near & determined[:, None])[..., None] * (s / scale)[..., None] ** np.arange(3)
     transposed = basis.swapaxes(1, 2)
+    # All s may be the same.
     inverse = np.linalg.inv(transposed @ basis + RIDGE * np.eye(3))
     solution = inverse @ (transposed @ r)
     off = r - basis @ solution

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A finger that goes on by rays from contact to contact in a sampling plane (paper, section V)."""
+"""A finger that moves by rays from contact to contact in a sampling plane (paper, section V)."""
 
 import math
 from collections.abc import Callable, Generator, Sequence
@@ -14,7 +14,6 @@ MAX_TURN = math.cos(math.radians(45.0))  # A sharper turn between two contacts i
 # A normal tilted more against that at the point has slopes above 3.7.
 MAX_TILT = math.cos(math.radians(75.0))
 LEAST_IN_PLANE = 1e-3  # A surface normal has at least this share in the sampling plane.
-
 # The surface is that of a patch if the cosine between their normals is more, that of 40 degrees: an edge of
 # 45 that is crossed aslant turns less in the plane (python -m benchmarks.atlas --shapes).
 SAME_SHEET_COSINE = 0.77

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import Array
+from ..arguments import DECIMALS, Array
 from .contour import Contour, consistently_oriented
 from .curves import WINDOW, distances_from_point
 
@@ -23,12 +23,11 @@ MOST_CONTACTS = 100
 # test_thinning judges these: no rest may ruin a fit, and no contacts without one may change.
 CELLS = 1000  # The curve's longer side has this many cells. A place is a cell and its neighbors.
 RESTING = 4  # A place with more times the usual number of contacts is a rest.
-TANGENT = 1 / 16  # This share of the cells with contacts shows the tangent, also that of a steep curve.
-DECIMALS = 9  # Weights are compared to this decimal, so that rounding does not choose.
+TANGENT_SHARE = 1 / 16  # This share of the cells with contacts shows the tangent, also of a steep curve.
 
 
 def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:
-    """The contour of at most MOST_CONTACTS means besides the point, and the number of contacts in each mean.
+    """The contour of at most MOST_CONTACTS means without the point, and the number of contacts in each mean.
 
     It runs as the given contour does; noise and normal_std are those of the means. A rest counts as the usual
     number of contacts. At most MOST_CONTACTS without a rest stay as they are.
@@ -77,13 +76,13 @@ def _along(r: Array, distance: Array) -> tuple[Array, Array]:
 
     The sign makes them rise with the index.
     """
-    # So few contacts as can be no rest may be stray ones, far out, and say nothing about the curve's length.
+    # Contacts too few for a rest may be stray ones, far out, which do not show the curve's length.
     cells = np.ceil(distance * (CELLS / np.partition(distance, -RESTING)[-RESTING]))
     cells = np.minimum(cells, 2 * CELLS).astype(np.intp)
     counts = np.bincount(cells)
     # Contacts near the point show the tangent, because a steep curve's longest axis is its normal.
     filled = np.cumsum(counts > 0)
-    near = np.flatnonzero(cells <= np.searchsorted(filled, max(WINDOW, TANGENT * filled[-1])))
+    near = np.flatnonzero(cells <= np.searchsorted(filled, max(WINDOW, TANGENT_SHARE * filled[-1])))
     moments = r[near].T @ (r[near] / counts[cells[near], None])
     along = np.copysign(distance, r @ np.linalg.eigh(moments)[1][:, -1])
     along *= np.copysign(1.0, (np.arange(len(along)) - (len(along) - 1) / 2.0) @ along)

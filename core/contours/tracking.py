@@ -55,7 +55,7 @@ def tracker(
     tangent: ArrayLike | None = None,
     least_cosine: float = -1.0,
 ) -> Callable[[float], list[Contour]]:
-    """`track` as a function of the extent, which goes on from where it was at a longer one.
+    """`track` as a function of the extent, which continues its contours at a longer one.
 
     least_cosine : a contour ends where the normals of two contacts turn by more than this cosine's angle
     """

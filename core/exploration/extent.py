@@ -33,8 +33,9 @@ from .taps import tapped
 MOST_CONTACTS = 16  # The longest half curves that are tried have this number of contacts.
 RUNGS = 4  # After this number of lengths with one ratio, which halve them, the step is halved.
 HALVINGS = 8  # The step is halved this many times. With 6, 45 of 900 touches of scans more are in doubt.
-# Contacts up to this roughness are fitted: with 0.012 there are a quarter more fits, and one of 540 more is
-ROUGH = 0.01  # sure.
+# Contacts up to this roughness are fitted: with 0.012 there are a quarter more fits, and one more of 540
+# touches is sure.
+ROUGH = 0.01
 # A sure patch is off its taps by at most this share of the radius in the mean, where a place without surface
 # is off by the radius: with 0.02 sure patches are 6 % farther off, with 0.01 they have a seventh less area.
 TAPS_OFF = 0.015
@@ -73,7 +74,7 @@ class Exploration:
     @property
     def reach(self) -> float:
         """The length of the longest half curve; the surface may end all before the extent."""
-        return self.step * max(max(_sides(contour, self.result.point)) for contour in self.contours)
+        return self.step * max(max(_side_counts(contour, self.result.point)) for contour in self.contours)
 
 
 Steps = Generator[Request, Answer, Exploration]
@@ -89,7 +90,8 @@ class Touch:
     point : (3,)
     reference : columns e1, n and e1 x n, from which azimuths are measured
     farthest : a length that no half curve exceeds
-    followed : for each step what follows the contours of the options' planes, how far, and these contours
+    followed : by step, the function that tracks the contours of the options' planes, the longest extent so
+        far, and the contours to this extent
     tapped : contacts of taps, (n, 3) each
     """
 
@@ -134,8 +136,8 @@ class Touch:
     def _longest_sure(self) -> Steps:
         """The touch of the longest half curves whose patch is sure, or else the most certain of all.
 
-        Half curves that end at the point, or are rough, hardly carry a sure fit: of these, one is fitted
-        where no other is sure, that whose curvature is the least rough.
+        Half curves that end at the point, or are rough, rarely have a sure fit. If no other patch is sure,
+        one of these is fitted, the one of the least roughness per squared length.
         """
         tried: list[Exploration] = []
         rough: list[tuple[float, tuple[float, int]]] = []
@@ -155,10 +157,7 @@ class Touch:
                 if _is_sure(explored, self.options):
                     return explored
             tried.append(explored)
-            r = explored.result
-            is_noisy = r.mean_height_std > DOUBTFUL_STD * r.radius and not suffices(r)
-            # Noise leaves shorter half curves even less certain, and these lie in fewer facets.
-            if is_noisy or [doubt.code for doubt in r.doubts] == ["facets"]:
+            if _are_shorter_worse(explored.result):
                 break
         if rough or not tried:
             longest = self.farthest / MOST_CONTACTS, MOST_CONTACTS
@@ -193,13 +192,13 @@ class Touch:
     def _rungs(self) -> Iterator[tuple[float, int]]:
         """Steps and numbers of contacts of half curves, from long to short.
 
-        Half curves that the surface ends all are the same on longer rungs, which are left out.
+        Lengths at which the surface has ended every half curve already would repeat it, and are left out.
         """
         for halvings in range(HALVINGS + 1):
             finest = self.farthest / MOST_CONTACTS / 2.0**halvings
             step = self.options.step or finest
             contours = self._followed(step, MOST_CONTACTS * finest)
-            longest = max(max(_sides(contour, self.point)) for contour in contours)
+            longest = max(max(_side_counts(contour, self.point)) for contour in contours)
             shares = 2.0 ** (-np.arange(RUNGS + 1) / RUNGS)
             counts = (MOST_CONTACTS * shares * finest / step + 1e-6).astype(int).tolist()
             yield from ((step, count) for count, shorter in pairwise(counts) if min(longest, count) > shorter)
@@ -215,9 +214,9 @@ class Touch:
         return Exploration(contours, r, step * count, between, tuple(self.options.planes))
 
     def _denser(self, step: float, count: int) -> Iterator[tuple[list[Contour], float]]:
-        """Contours with half curves of `count` contacts, then more often felt, and their steps.
+        """Contours of half curves of `count` contacts, and then of more in the same length; and their steps.
 
-        An automatic touch begins where there are contacts on all sides of the point, or is felt most often.
+        An automatic extent begins with the longest step that has contacts on all sides of the point.
         """
         given = self.options.step
         steps = [step / times for times in DENSER] if given is None else [given]
@@ -226,24 +225,24 @@ class Touch:
             if between == steps[-1] or self.options.extent or not stops_at(contours, self.point):
                 yield contours, between
 
-    def _with_taps(self, found: Exploration) -> Exploration:
+    def _with_taps(self, explored: Exploration) -> Exploration:
         """The touch together with its taps, and as uncertain as facets leave it."""
-        r = found.result
+        r = explored.result
         # A largest deviation judges the fit in place of shares of the radius.
         if r.taps is not None or self.options.largest_std is not None:
-            return found
+            return explored
         taps, contacts = tapped(self.surface, r, np.concatenate(self.tapped))
         self.tapped.append(contacts)
         r = replace(r, taps=taps, known_height_std=r.mean_height_std)
-        return replace(found, result=with_facets(r, self.surface))
+        return replace(explored, result=with_facets(r, self.surface))
 
     def _followed(self, step: float, extent: float) -> list[Contour]:
         """The contours of the planes with contacts this step apart, at least to an extent."""
         if step not in self.followed:
             self.followed[step] = self.follow(self.options.planes, step=step), 0.0, []
-        feel, known, contours = self.followed[step]
-        if extent > known:
-            self.followed[step] = feel, extent, (contours := feel(extent))
+        follow, longest, contours = self.followed[step]
+        if extent > longest:
+            self.followed[step] = follow, extent, (contours := follow(extent))
         return contours
 
     def _cut(self, step: float, count: int) -> list[Contour]:
@@ -253,14 +252,14 @@ class Touch:
             return contours
         return [_shortened(contour, self.point, count) for contour in contours]
 
-    def _with_plane(self, found: Exploration, plane: SamplingPlane) -> Steps:
+    def _with_plane(self, explored: Exploration, plane: SamplingPlane) -> Steps:
         """The touch with one plane more. Raises ValueError if nothing can be felt along it."""
-        (more,) = self.follow((plane,), step=found.step)(found.extent)
-        if found.extent < self.farthest:
+        (more,) = self.follow((plane,), step=explored.step)(explored.extent)
+        if explored.extent < self.farthest:
             more = _shortened(more, self.point, len(more.points))
-        contours = [*found.contours, more]
+        contours, planes = [*explored.contours, more], (*explored.planes, plane)
         r = yield from _fitted(contours)
-        return self._with_taps(replace(found, contours=contours, result=r, planes=(*found.planes, plane)))
+        return self._with_taps(replace(explored, contours=contours, result=r, planes=planes))
 
 
 def _fitted(contours: list[Contour]) -> Generator[Request, Answer, Reconstruction]:
@@ -281,33 +280,39 @@ def suffices(r: Reconstruction) -> bool:
     return r.mean_height_std <= MISFIT * r.radius or by_noise <= 0.5 * r.mean_height_std**2
 
 
-def _is_sure(found: Exploration, options: ExplorationOptions) -> bool:
-    """Whether a touch is as certain as the options ask, and its patch explains contacts and taps."""
-    r = found.result
+def _are_shorter_worse(r: Reconstruction) -> bool:
+    """Whether a patch is in doubt for a reason that shorter half curves make worse: noise, or few facets."""
+    is_noisy = r.mean_height_std > DOUBTFUL_STD * r.radius and not suffices(r)
+    return is_noisy or [doubt.code for doubt in r.doubts] == ["facets"]
+
+
+def _is_sure(explored: Exploration, options: ExplorationOptions) -> bool:
+    """Whether a touch is as certain as the options require, and its patch explains contacts and taps."""
+    r = explored.result
     off = 0.0 if r.taps is None else (r.taps.height or 0.0) / r.radius + r.taps.missing
     is_ok = r.status == OK and off <= TAPS_OFF
     is_certain = r.mean_height_std <= options.largest_std if options.largest_std else is_ok
-    return is_certain and _explains(found, options)
+    return is_certain and _explains(explored, options)
 
 
-def _explains(found: Exploration, options: ExplorationOptions) -> bool:
+def _explains(explored: Exploration, options: ExplorationOptions) -> bool:
     """Whether the patch explains the contacts of its contours, or is within the largest deviation of them."""
-    r = found.result
-    x, y, z = r.frame.to_local(np.concatenate([contour.points for contour in found.contours])).T
+    r = explored.result
+    x, y, z = r.frame.to_local(np.concatenate([contour.points for contour in explored.contours])).T
     off, noise = z - r.height(x, y), max(options.noise, float(r.posterior.noise) * r.radius)
     far = too_far(off, np.hypot(r.height_std(x, y), noise)) & (np.abs(off) > (options.largest_std or 0.0))
     return are_few(far, np.append(far[1:], False))
 
 
-def _sides(contour: Contour, point: Array) -> tuple[int, int]:
+def _side_counts(contour: Contour, point: Array) -> tuple[int, int]:
     """The numbers of contacts on either side of a point, which is one of them."""
     at = int(np.argmax((contour.points == point).all(axis=1)))
     return at, len(contour.points) - 1 - at
 
 
 def _shortened(contour: Contour, point: Array, count: int) -> Contour:
-    """The contour of at most `count` contacts on either side of a point, as one followed no farther."""
-    before, after = _sides(contour, point)
+    """The contour of at most `count` contacts on either side of a point, with the stops of such a one."""
+    before, after = _side_counts(contour, point)
     stops = [
         UNEXPLAINED if n > count or stop == EXTENT else stop
         for n, stop in zip((before, after), contour.stops or (), strict=True)

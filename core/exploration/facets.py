@@ -3,7 +3,7 @@
 """The curvatures of the shape that the facets of a mesh stand for, where a touch has felt few of them."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import cache
 from typing import NamedTuple, Protocol, runtime_checkable
@@ -17,23 +17,22 @@ from ..reconstruction.result import Reconstruction
 
 # benchmarks.facets shows how far curvatures are off with these.
 # The shape's are those by which facets turn within the first number of widths, and those of the corners of
-# facets within the others, where the patch turns by BEND or less.
+# facets within the others, where the patch turns by SMOOTH or less.
 TURNING, CORNERS = 2.0, (0.6, 1.3)
 # Corners determine a quadric if the smallest singular value of their equations is above this share.
 DETERMINED = 0.01
-BEND = math.radians(40.0)
 TURNS = np.radians([0.0, 20.0, 40.0])  # The curves, turned by these around the normal, show where facets are.
-# Edges between these angles stand for a smooth bend,
-DISTINCT_COSINE, SMOOTH_COSINE = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))
+# Edges that turn by angles between these stand for a smooth bend,
+DISTINCT, SMOOTH = math.radians(1.0), math.radians(40.0)
 # if both facets have this share of the wider one's width across it; else one is a fillet. Facets are fine if
-# that at the point is narrower than this share of the radius.
+# the one at the point is narrower than this share of the radius.
 MIN_WIDTH_RATIO = 0.25
-NEIGHBOR_STEP = 0.05  # The facet behind an edge is looked for this share of the width beyond it.
+NEIGHBOR_STEP = 0.05  # The neighbor across an edge is the facet at this share of the width beyond the edge.
 
 
 @runtime_checkable
 class FacetedSurface(Protocol):
-    """A surface whose faces can be looked at."""
+    """A surface that consists of flat faces."""
 
     def face_near(self, point: Array) -> int:
         """The number of the face nearest to a point (3,) of the world."""
@@ -66,39 +65,27 @@ def with_facets(r: Reconstruction, surface: object) -> Reconstruction:
 
 def _shape_curvatures(r: Reconstruction, mesh: FacetedSurface) -> list[Array]:
     """The principal curvatures (2,) of the shape, in order, by how facets turn and by their corners."""
-    shape = cache(lambda face: _facet(mesh.corners_of(face)))
-
-    def facet_near(at: Array) -> Facet:
-        """The face nearest to a point (3,)."""
-        return shape(mesh.face_near(at))
-
-    width = _smooth_width(facet_near(r.frame.origin), facet_near)
+    width = _smooth_width(r.frame.origin, mesh)
     if width < max(MIN_WIDTH_RATIO * r.radius, SMALLEST):
         return []
-    points = _around(r, TURNING * width)
-    faces = [mesh.face_near(point) for point in points]
-    within = [set(map(mesh.face_near, _around(r, share * width))) for share in CORNERS]
-    by_corners = [_of_corners(r, map(shape, some)) for some in within]
-    turning = _turning(r, points, [shape(face) for face in faces])
-    return [turning, *(found for found in by_corners if found is not None)]
+    facet, points = cache(lambda face: _facet(mesh, face)), _around(r, TURNING * width)
+    by_turning = _turning(r, points, [facet(mesh.face_near(point)) for point in points])
+    faces_within = [set(map(mesh.face_near, _around(r, share * width))) for share in CORNERS]
+    by_corners = [_of_corners(r, map(facet, faces)) for faces in faces_within]
+    return [by_turning, *(estimate for estimate in by_corners if estimate is not None)]
 
 
 def is_beside_bend(point: Array, mesh: FacetedSurface) -> bool:
     """Whether the facet nearest to a point (3,) has an edge that stands for a smooth bend, as on a ball."""
-
-    def facet_near(at: Array) -> Facet:
-        """The face nearest to a point (3,)."""
-        return _facet(mesh.corners_of(mesh.face_near(at)))
-
-    return _smooth_width(facet_near(point), facet_near) > 0.0
+    return _smooth_width(point, mesh) > 0.0
 
 
 def _around(r: Reconstruction, reach: float) -> Array:
     """Points (n, 3) of the world along the curves, out to a length, and these turned around the normal.
 
-    Where facets narrow, as near the tip of a cone, the points reach no farther than the patch turns by BEND.
+    Where facets narrow, as near the tip of a cone, the points end where the patch has turned by SMOOTH.
     """
-    reach = 1.0 / max(abs(r.k1) / BEND, abs(r.k2) / BEND, 1.0 / reach)
+    reach = 1.0 / max(abs(r.k1) / SMOOTH, abs(r.k2) / SMOOTH, 1.0 / reach)
     points = np.vstack([contour.points for contour in r.contours])
     x, y, z = reach / r.radius * r.frame.to_local(points).T
     turned = [(x * c - y * s, x * s + y * c, z) for c, s in zip(np.cos(TURNS), np.sin(TURNS), strict=True)]
@@ -131,38 +118,40 @@ def _of_corners(r: Reconstruction, facets: Iterable[Facet]) -> Array | None:
     size = float(np.abs([x, y]).max()) or 1.0
     u, v = x / size, y / size
     taylor = np.column_stack([np.ones_like(u), u, v, 0.5 * u**2, u * v, 0.5 * v**2])
-    found, _, rank, _ = np.linalg.lstsq(taylor, z, rcond=DETERMINED)
-    if rank < len(found):
+    coefficients, _, rank, _ = np.linalg.lstsq(taylor, z, rcond=DETERMINED)
+    if rank < len(coefficients):
         return None
-    fitted = Derivatives(*(found / size ** np.array([0, 1, 1, 2, 2, 2])))
+    fitted = Derivatives(*(coefficients / size ** np.array([0, 1, 1, 2, 2, 2])))
     return np.array(fitted.principal_curvatures) / r.radius
 
 
-def _smooth_width(facet: Facet, facet_near: Callable[[Array], Facet]) -> float:
-    """The largest width of a facet across an edge that stands for a smooth bend, or 0 if none does.
+def _smooth_width(point: Array, mesh: FacetedSurface) -> float:
+    """The largest width of the facet at a point across an edge that stands for a smooth bend, or 0 without.
 
     An edge to a facet that is much narrower, or wider, is one of a fillet.
     """
-    bends = _bends(facet, facet_near)
+    bends = _bends(point, mesh)
     return max((min(widths) for widths in bends if min(widths) >= MIN_WIDTH_RATIO * max(widths)), default=0.0)
 
 
-def _bends(facet: Facet, facet_near: Callable[[Array], Facet]) -> Iterator[tuple[float, float]]:
-    """The widths of the facet and of its neighbor across each edge whose angle is that of a smooth bend."""
+def _bends(point: Array, mesh: FacetedSurface) -> Iterator[tuple[float, float]]:
+    """The widths of the facet at a point and of its neighbor across each edge that turns as a smooth bend."""
+    facet = _facet(mesh, mesh.face_near(point))
     starts, along = facet.corners, np.roll(facet.corners, -1, axis=0) - facet.corners
     outward = np.cross(along, facet.normal)
     for start, edge, out in zip(starts, along, outward, strict=True):
         if not np.any(out):
             continue
         width = facet.width(edge)
-        beyond = facet_near(start + 0.5 * edge + NEIGHBOR_STEP * width * out / np.linalg.norm(out))
-        if SMOOTH_COSINE < float(facet.normal @ beyond.normal) < DISTINCT_COSINE:
-            yield width, beyond.width(edge)
+        beyond = start + 0.5 * edge + NEIGHBOR_STEP * width * out / np.linalg.norm(out)
+        neighbor = _facet(mesh, mesh.face_near(beyond))
+        if math.cos(SMOOTH) < float(facet.normal @ neighbor.normal) < math.cos(DISTINCT):
+            yield width, neighbor.width(edge)
 
 
-def _facet(corners: ArrayLike) -> Facet:
-    """The face with these corners; its normal is 0 if it has no area."""
-    points = np.asarray(corners, dtype=float)
+def _facet(mesh: FacetedSurface, number: int) -> Facet:
+    """The face of this number; its normal is 0 if it has no area."""
+    points = np.asarray(mesh.corners_of(number), dtype=float)
     sides = points - points[0]
     across = np.cross(sides[1:-1], sides[2:]).sum(axis=0)
     return Facet(points, across / (float(np.linalg.norm(across)) or 1.0))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import list_of, number
+from ..arguments import list_of, number, number_or_none, set_fields
 from ..contours.contour import SamplingPlane
 from ..contours.tracking import generator_of
 from ..reconstruction.options import FitOptions
@@ -62,13 +62,14 @@ class ExplorationOptions:
         extent, step = _length("extent", self.extent), _length("step", self.step)
         if extent and step and step > extent:
             raise ValueError(f"step: expected no more than the extent {extent:g}, got {step:g}")
-        vars(self).update(  # __setattr__ of a frozen dataclass raises.
+        set_fields(
+            self,
             planes=planes_of(self.planes),
             extent=extent,
             step=step,
             farthest=extent or _length("farthest", self.farthest),
             largest_std=_length("largest_std", self.largest_std),
-            tolerance=None if self.tolerance is None else number("tolerance", self.tolerance, least=0.0),
+            tolerance=number_or_none("tolerance", self.tolerance, least=0.0),
             most_planes=number("most_planes", self.most_planes, least=3.0),
             noise=number("noise", self.noise, least=0.0),
         )

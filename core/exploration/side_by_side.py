@@ -16,23 +16,23 @@ from ..contours.finger import SAME_SHEET_COSINE, NoContactError, Surface, checke
 from ..contours.tracking import generator_of, track, tracker
 from ..reconstruction.from_contours import fitted
 from ..reconstruction.options import FitOptions
-from ..reconstruction.start import Given
+from ..reconstruction.start import TouchContacts
 from ..reconstruction.strokes import gathered
 from .extent import MOST_CONTACTS, Answer, Exploration, Request, Steps, Touch
 from .options import ExplorationOptions
 from .taps import HAIR
 
-LONGEST = 1e15  # Lengths beyond this multiple of the first that is tried, or below its inverse, are not.
+LONGEST = 1e15  # Lengths up to this multiple of the first one are tried, and down to its inverse.
 BISECTIONS = 6  # They narrow a factor of two to a 64th of it,
 SHEET_BISECTIONS = 26  # and these so far that what they began with changes results by less than 1e-6.
 ODD = math.e  # Fractions of an object's size would end exactly on its edges, those of this multiple do not.
 
-Found = Generator[None, None, list[Exploration | ValueError]]
+Results = Generator[None, None, list[Exploration | ValueError]]
 
 
 def exploring_many(
     surface: Surface, points: ArrayLike, outward: ArrayLike, options: ExplorationOptions
-) -> Found:
+) -> Results:
     """What `explore_many` gives, in steps: yields after each contour and each stack of fits.
 
     points, outward : (m, 3)
@@ -76,11 +76,11 @@ def _farthest(
 
     track_along : `track` as a function of planes, extent and step
 
-    The lengths that are tried follow from the surface, so that another unit does not change what is found.
+    The lengths that are tried follow from the surface, so that another unit does not change the result.
     """
 
     def ended(length: float) -> bool:
-        """Whether all half curves, felt with few contacts, end before that, or nothing can be felt so."""
+        """Whether all half curves, tracked with few contacts, end before this, or no contact can be made."""
         lengths = {"extent": length, "step": length / (MOST_CONTACTS // 2)}
         try:
             contours = (contour for plane in planes for contour in track_along([plane], **lengths))
@@ -134,7 +134,7 @@ def _depth(surface: Surface, point: Vector, outward: Vector, length: float) -> f
     return None
 
 
-def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: FitOptions) -> Found:
+def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: FitOptions) -> Results:
     """The results of b touches at points (b, 3) with outward directions (b, 3); fits are done in stacks.
 
     Yields after each contour and each stack.
@@ -155,7 +155,7 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
         for method in dict.fromkeys(("bayes", fit.method)):
             which = [i for i, r in requests.items() if ("bayes" if r.searching else fit.method) == method]
             options = replace(fit, method=method)
-            touches = [Given(requests[i].contours, *gathered(())) for i in which]
+            touches = [TouchContacts(requests[i].contours, *gathered(())) for i in which]
             if which:
                 results = fitted(points[which], touches, outward[which], options)
                 answers.update(zip(which, results, strict=True))

@@ -16,12 +16,12 @@ from ..reconstruction.status import CONTRADICTING, DOUBTFUL_GAP, Taps, useless
 from ..verdict import OK, Doubt, beyond
 
 # benchmarks.refusals of e20b52a counted the patches that are off, but ok.
-HAIR = 1e-4  # Rays go on this share of their reach beyond each layer of the mesh.
+HAIR = 1e-4  # A ray continues this share of its reach behind each layer of the mesh.
 ABOVE = 0.01  # A ray from this share of the radius above a point meets its own layer.
 # Four taps between two ends of curves are at this share of the way to the boundary: without them two of 540
 # touches of scans miss a pocket (benchmarks.real --only automatic).
 NEAR_RIM = 0.98
-# A tap that is off by more deviations contradicts the fit by itself. With 5, which contacts have, patches of
+# A single tap that is off by more deviations contradicts the fit. With 5, which contacts have, patches of
 # spheres of facets are in doubt, and seven more of 540 touches of scans.
 TOO_FAR_OFF = 10.0
 

@@ -55,7 +55,7 @@ def explore(
     noise, rng, tangent : as in `track`; the contours pass the noise on to the fit
     method, degree, weight, solver : as in `reconstruct`
 
-    If a contour was not followed any farther, its `stops` are UNEXPLAINED. Raises what `track` and
+    Half curves that the touch ends itself have the stop "fit no longer matched". Raises what `track` and
     `reconstruct` raise, and ValueError where curves do not end and `farthest` is None.
 
     >>> import math
@@ -65,31 +65,31 @@ def explore(
     ...         root = math.sqrt(max((o @ d) ** 2 - o @ o + 1.0, 0.0))
     ...         t = next((t for t in (-o @ d - root, -o @ d + root) if root and 0.0 < t <= distance), None)
     ...         return None if t is None else (tuple(o + t * d), tuple(o + t * d))
-    >>> found = explore(Ball(), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0))
-    >>> found.result.status, round(found.result.patch.k1, 1), 0.5 < found.extent < 1.5
+    >>> touch = explore(Ball(), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0))
+    >>> touch.result.status, round(touch.result.patch.k1, 1), 0.5 < touch.extent < 1.5
     ('ok', -1.0, True)
     """
     p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
     options = ExplorationOptions(
         planes_of(planes),
-        farthest,
-        largest_std,
-        tolerance,
-        most_planes,
-        extent,  # type: ignore[arg-type]  # "auto" becomes None
-        step,  # type: ignore[arg-type]
-        noise,
-        rng,
-        tangent,
-        method,
-        degree,
-        weight,
-        solver,
+        farthest=farthest,
+        largest_std=largest_std,
+        tolerance=tolerance,
+        most_planes=most_planes,
+        extent=extent,  # type: ignore[arg-type]  # "auto" becomes None
+        step=step,  # type: ignore[arg-type]
+        noise=noise,
+        rng=rng,
+        tangent=tangent,
+        method=method,
+        degree=degree,
+        weight=weight,
+        solver=solver,
     )
-    (found,) = result_of(exploring_many(surface, p[None], up[None], options))
-    if isinstance(found, ValueError):
-        raise found
-    return found
+    (explored,) = result_of(exploring_many(surface, p[None], up[None], options))
+    if isinstance(explored, ValueError):
+        raise explored
+    return explored
 
 
 def explore_many(

@@ -134,12 +134,12 @@ def _newton_step(
     while True:
         lengths = along / (np.maximum(np.abs(curvatures), 1e-9) + damping)
         trial = a - axes @ lengths
-        there = objective.fields(trial)
-        trial_value = objective.value(there, rounding)
+        trial_fields = objective.fields(trial)
+        trial_value = objective.value(trial_fields, rounding)
         expected = float(lengths @ (along - 0.5 * curvatures * lengths))
         if trial_value < value:
             quick = value - trial_value > 0.7 * expected
-            return trial, there, trial_value, damping * (0.1 if quick else 2.0)
+            return trial, trial_fields, trial_value, damping * (0.1 if quick else 2.0)
         if expected <= 1e-10 * value:
             return a, at, value, damping
         damping = max(4.0 * damping, 1e-3)

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The domain D of a patch: inside a closed cubic spline through the projected curve ends (paper, IV-A).
 
-Where the surface itself ends, the spline would bulge over what is not there. So it is straight next to such
-ends.
+Where the surface itself ends, the spline would bulge beyond the surface. So it is straight next to such ends.
 """
 
 import math
@@ -35,7 +34,7 @@ class Domain:
     """The part of the tangent plane over which a patch is valid (paper, IV-A); star-shaped about the origin.
 
     ends : (m, 2), m >= 3, the projected ends of the contours, sorted by azimuth
-    open_ends : (m,), whether the surface ends there, at a crease or at its border; None if it ends nowhere
+    open_ends : (m,), whether the surface ends at them, by a crease or its border; None if it ends at none
     """
 
     ends: Array
@@ -88,10 +87,10 @@ class Domain:
         order = np.argsort(azimuths)
         return azimuths[order], radii[order]
 
-    def _along_spline(self, each: int) -> Array:
-        """This number of places on each piece of the closed spline, (m each, 2)."""
+    def _along_spline(self, count: int) -> Array:
+        """`count` places on each piece of the closed spline, (m count, 2)."""
         chords, (start, slope, bend, third) = self._spline
-        t = (chords[:, None] / each * np.arange(each))[..., None]
+        t = (chords[:, None] / count * np.arange(count))[..., None]
         start, slope, bend, third = (part[:, None] for part in (start, slope, bend, third))
         return (start + t * (slope + t * (bend + t * third))).reshape(-1, 2)
 

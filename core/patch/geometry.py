@@ -13,8 +13,8 @@ from .differential_geometry import Derivatives
 from .domain import GRID, Domain
 from .monge import HeightField
 
-SIMILARITY_TOLERANCE = 1e-4  # A similarity in single precision may be off by so much.
-POINTS_AT_ONCE = 20_000  # Distances of so many points take some 50 MB; those of millions took gigabytes.
+SIMILARITY_TOLERANCE = 1e-4  # A similarity in single precision may be off by this.
+POINTS_AT_ONCE = 20_000  # Distances of this number of points take 50 MB, those of millions gigabytes.
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@
 
 A flat triangle is off a surface with second derivatives H by |e' H e| / 8 at the middle of an edge e, and by
 a third more inside it on a bowl. So the distance of neighbors that is wanted falls with the curvature. The
-boundary is followed by short edges, which need more points near themselves, and only there. Rows of the
+boundary is followed by short edges, which need more points, but only near themselves. Rows of the
 lattices are parallel to x and have a point at the origin, so they are symmetric about both axes, as patches
 are.
 """
@@ -100,18 +100,29 @@ def _rim(domain: Domain, size: Size, off: float) -> tuple[Array, float]:
     sagitta = 0.5 * second[(to_corner > between).all(axis=1)].max(initial=0.0)
     rings = np.arange(5)[:, None, None] / 4.0 * samples
     sizes = size(rings.reshape(-1, 2)).reshape(5, RIM_SAMPLES)
+    finest = float(sizes.min())
     bound = max(RIM_SAMPLES / 2.0 * math.sqrt(sagitta / off), lengths[-1] / (RIM_SPACING * sizes[-1].min()))
     count = 4 * math.ceil(min(bound, MOST_RIM_EDGES) / 4.0)
     if not len(corners):
-        return around(lengths[-1] / count * np.arange(count)), float(sizes.min())
+        return around(lengths[-1] / count * np.arange(count)), finest
     order = np.argsort(bends)
-    bends, pieces = bends[order], []
-    for corner, start, end in zip(corners[order], bends, [*bends[1:], bends[0] + lengths[-1]], strict=True):
-        share = count * (end - start) / lengths[-1]
+    steps = _steps_between(bends[order], lengths[-1], count)
+    pairs = zip(corners[order], steps, strict=True)
+    return np.vstack([part for corner, at in pairs for part in (corner[None], around(at))]), finest
+
+
+def _steps_between(bends: Array, length: float, count: int) -> list[Array]:
+    """Lengths along the boundary at which the rim has points from each corner to the next, without both.
+
+    bends : (k,), the lengths at which corners are, ascending
+    length, count : of the whole boundary, and its number of edges if it had no corners
+    """
+    steps = []
+    for start, end in zip(bends, [*bends[1:], bends[0] + length], strict=True):
+        share = count * (end - start) / length
         edges = 2 * math.ceil(0.5 * share - 1e-6) if share > 1.0 else 1  # If even, none is across an axis.
-        steps = start + (end - start) / edges * np.arange(1, edges)
-        pieces += [corner[None], around(steps)]
-    return np.vstack(pieces), float(sizes.min())
+        steps.append(start + (end - start) / edges * np.arange(1, edges))
+    return steps
 
 
 def _lattice(domain: Domain, size: Size, rim: Array, finest: float) -> Array:

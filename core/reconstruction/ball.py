@@ -17,11 +17,13 @@ from ..arguments import SMALLEST, Array
 from ..contours.common_point import common_point
 from ..contours.contour import Contour
 from ..contours.local_geometry import DegenerateCurvesError
+from ..verdict import SIGNIFICANT
 from .result import Reconstruction
 
-# Slopes of centers are those of parabolas through SIDE centers, or a SIDES-th of all, on either side.
-SIDE, SIDES = 8, 6
-KINK, KINK_STDS = 0.1, 5.0  # They have a kink if slopes differ by more, and by more of their deviations.
+# Slopes on either side of a place are those of parabolas through the first number of centers, or through all
+# centers divided by the second number if these are more.
+PARABOLA_CENTERS, PARABOLAS = 8, 6
+KINK = 0.1  # Centers have a kink if slopes differ by more, and by SIGNIFICANT deviations.
 
 
 def ball_of(contours: Sequence[Contour], strokes: Sequence[ArrayLike | Contour]) -> float:
@@ -85,7 +87,7 @@ def _require_reached(centers: Reconstruction, contour: Contour) -> None:
     way = local[np.argmax(away), :2] / max(float(away.max()), SMALLEST)
     order = np.argsort(local[:, :2] @ way, kind="stable")
     s, z = (local[:, :2] @ way)[order], local[order, 2]
-    count = max(SIDE, len(s) // SIDES)
+    count = max(PARABOLA_CENTERS, len(s) // PARABOLAS)
     bends = []
     for i in range(count, len(s) - count + 1):
         middle = 0.5 * (s[i - 1] + s[i])
@@ -95,8 +97,8 @@ def _require_reached(centers: Reconstruction, contour: Contour) -> None:
     if len(jumps) == 0:
         return
     noise = max(float(np.median(off)), contour.noise or 0.0)
-    worst = int(np.argmax(jumps - KINK_STDS * noise * levers))
-    if jumps[worst] > max(KINK, KINK_STDS * noise * levers[worst]):
+    worst = int(np.argmax(jumps - SIGNIFICANT * noise * levers))
+    if jumps[worst] > max(KINK, SIGNIFICANT * noise * levers[worst]):
         x, y, z = contour.points[order[int(places[worst])]]
         raise DegenerateCurvesError(
             f"the centers have a kink at ({x:.3g}, {y:.3g}, {z:.3g}), so the ball does not reach the bottom "

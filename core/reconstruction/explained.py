@@ -6,16 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..verdict import SIGNIFICANT
 
-# A contact is off a surface by more than TOO_FAR deviations. At most the share FEW are, and no two that are
-# side by side: otherwise a rib of a 25th of the radius is an error of few contacts, and a dent that holds 2 %
+# At most this share of the contacts is off a surface by SIGNIFICANT deviations, and no two that are side by
+# side: otherwise a rib of a 25th of the radius is an error of few contacts, and a dent that holds 2 %
 # of an object's contacts is erased (benchmarks.measured --features).
-TOO_FAR, FEW = 5.0, 0.01
+FEW = 0.01
 
 
 def too_far(distances: Array, stds: Array | float) -> NDArray[np.bool_]:
     """Which contacts (n,) are farther from a surface than these deviations (n,), or this one, explain."""
-    far: NDArray[np.bool_] = np.abs(distances) > TOO_FAR * np.asarray(stds)
+    far: NDArray[np.bool_] = np.abs(distances) > SIGNIFICANT * np.asarray(stds)
     return far
 
 

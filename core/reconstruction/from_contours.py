@@ -22,7 +22,7 @@ from .ball import ball_of, center_at, contacts_below
 from .options import FitOptions
 from .result import Reconstruction
 from .stacks import fitted_stack
-from .start import Given
+from .start import TouchContacts
 from .strokes import gathered
 
 STACK = 4000  # The number of contacts that fit into a processor's cache at once (benchmarks.speed, e20b52a).
@@ -122,7 +122,7 @@ def reconstruct_many(
 
 
 def fitted(
-    points: Array, touches: Sequence[Given], outward: Array, options: FitOptions
+    points: Array, touches: Sequence[TouchContacts], outward: Array, options: FitOptions
 ) -> list[Reconstruction | DegenerateCurvesError]:
     """What `reconstruct_many` gives for checked points (n, 3), n touches and outward directions (n, 3)."""
     # A stack has room for its longest contour in all places, so touches of similar size go together.
@@ -143,22 +143,22 @@ def fitted(
 
 def _touch(
     p: Array, contours: list[Contour], strokes: Sequence[ArrayLike | Contour], up: Array, options: FitOptions
-) -> tuple[Array, Given]:
+) -> tuple[Array, TouchContacts]:
     """The reference point (3,) and the contacts of a touch, below the centers of a ball if these are given.
 
     Raises DegenerateCurvesError if such centers carry no surface, or the ball is too large for it.
     """
-    touch, ball = _given(contours, strokes, options), ball_of(contours, strokes)
+    touch, ball = _touch_contacts(contours, strokes, options), ball_of(contours, strokes)
     if not ball:
         return p, touch
     center = center_at(p, contours, ball)
     centers = _fitted_one(center, touch, up, replace(options, method="bayes", degree="auto"))
     balls = [stroke for stroke in strokes if isinstance(stroke, Contour)]
     below, contours, balls = contacts_below(centers, contours, balls, ball)
-    return below if center is p else p, _given(contours, balls, options)
+    return below if center is p else p, _touch_contacts(contours, balls, options)
 
 
-def _fitted_one(p: Array, touch: Given, up: Array, options: FitOptions) -> Reconstruction:
+def _fitted_one(p: Array, touch: TouchContacts, up: Array, options: FitOptions) -> Reconstruction:
     """The result of one touch. Raises DegenerateCurvesError if it cannot carry the method."""
     (result,) = fitted_stack(p[None], [touch], up[None], options)
     if isinstance(result, DegenerateCurvesError):
@@ -166,13 +166,15 @@ def _fitted_one(p: Array, touch: Given, up: Array, options: FitOptions) -> Recon
     return result
 
 
-def _given(contours: list[Contour], strokes: Sequence[ArrayLike | Contour], options: FitOptions) -> Given:
+def _touch_contacts(
+    contours: list[Contour], strokes: Sequence[ArrayLike | Contour], options: FitOptions
+) -> TouchContacts:
     """The contacts of a touch. Raises ValueError for strokes or a radius that do not go with the options."""
-    given = Given(contours, *gathered(strokes, contours))
-    if len(given.strokes) and options.method != "bayes":
+    touch = TouchContacts(contours, *gathered(strokes, contours))
+    if len(touch.strokes) and options.method != "bayes":
         raise ValueError(
             f'strokes: expected none with "{options.method}", which fits contours only: use "bayes"'
         )
     if contours and options.radius is not None:
         raise ValueError("radius: expected none with contours, which say how far the patch reaches")
-    return given
+    return touch

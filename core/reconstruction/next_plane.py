@@ -14,9 +14,9 @@ from .result import Reconstruction
 
 # Azimuths that are tried: a plane that is 1.5 degrees off ends a 38th of L aside.
 TRIED = np.radians(np.arange(0.0, 180.0, 3.0))
-COARSE_STRIDE = 5  # Each fifth of them is tried first, with contours of FEW_CONTACTS,
-FEW_CONTACTS = 8
-NEARBY = np.arange(-(COARSE_STRIDE // 2), COARSE_STRIDE // 2 + 1)  # and then those next to the best.
+# Every fifth of them is tried first, with contours of FEW_CONTACTS, and then those next to the best.
+COARSE_STRIDE, FEW_CONTACTS = 5, 8
+NEARBY = np.arange(-(COARSE_STRIDE // 2), COARSE_STRIDE // 2 + 1)
 MOST_CONTACTS = 24  # More contacts show a contour's seven terms no better than this many with less noise.
 
 
@@ -31,7 +31,7 @@ def suggest_plane(
     Also returns the mean height_std that is expected after it, in the caller's unit.
 
     The contour is assumed to have the length, number of contacts and noise of those before. Its
-    effect depends on where it runs, not on the heights found there.
+    effect depends on where it runs, not on its heights.
     """
     points, weights = r.domain.nodes
     wanted = max(3, round(2 * len(r.contacts) / len(r.domain.ends)))

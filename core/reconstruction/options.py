@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arguments import number, shown
+from ..arguments import number_or_none, set_fields, shown
 from ..paper.by_method import PAPER_METHODS, SOLVERS
 
 METHODS = ("bayes", *PAPER_METHODS)
@@ -40,13 +40,14 @@ class FitOptions:
             value = getattr(self, name)
             if not isinstance(value, str) or value not in choices:
                 raise ValueError(f"{name}: expected one of {', '.join(choices)}, got {shown(value)}")
-        degree, weight = self.degree, self.weight
+        degree = self.degree
         if not isinstance(degree, int | np.integer | str) or degree not in ("auto", 2, 3, 4, 5, 6):
             raise ValueError(f'degree: expected a whole number from 2 to 6 or "auto", got {shown(degree)}')
-        vars(self).update(  # __setattr__ of a frozen dataclass raises.
+        set_fields(
+            self,
             degree=degree if isinstance(degree, str) else int(degree),
-            noise=None if self.noise is None else number("noise", self.noise, least=0.0),
-            point_std=None if self.point_std is None else number("point_std", self.point_std, least=0.0),
-            weight=None if weight is None else number("weight", weight, above=0.0),
-            radius=None if self.radius is None else number("radius", self.radius, above=0.0),
+            noise=number_or_none("noise", self.noise, least=0.0),
+            point_std=number_or_none("point_std", self.point_std, least=0.0),
+            weight=number_or_none("weight", self.weight, above=0.0),
+            radius=number_or_none("radius", self.radius, above=0.0),
         )

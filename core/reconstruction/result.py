@@ -11,12 +11,12 @@ from statistics import median
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arguments import LARGEST, Array, finite_array, many
+from ..arguments import LARGEST, Array, finite_array, many, set_fields
 from ..bayes.bends import Bends, bends_of
-from ..bayes.joint_fit import MISFIT, OUTLYING, posterior_of
+from ..bayes.joint_fit import MISFIT, posterior_of
 from ..bayes.near_point import curvature_contradiction
 from ..bayes.normals import contradiction, measured_normals, scatter
-from ..bayes.other_curves import ENOUGH, contradicting_curve
+from ..bayes.other_curves import LEAST_CURVES, contradicting_curve
 from ..bayes.posterior import SurfacePosterior, coefficients_of, terms_to
 from ..bayes.prior import FREE
 from ..contours.contour import SURFACE_ENDS, Contour, read_only, stops_at
@@ -33,7 +33,7 @@ from ..patch.domain import AT_POINT, Domain
 from ..patch.geometry import Geometry, similarity, total_absolute_curvature
 from ..patch.monge import MongePatch, exponents, monomials
 from ..patch.triangulation import patch_mesh
-from ..verdict import Doubt, Judged, beyond
+from ..verdict import SIGNIFICANT, Doubt, Judged, beyond
 from . import status
 from .status import Taps
 
@@ -55,11 +55,11 @@ class Reconstruction(Judged):
     point : (3,), the reference point as it was given
     point_std : its standard deviation along the normal, in units of L; 1 where only contacts show the surface
     converged : whether its solver converged
-    taps : what was felt between the curves; None if nobody tapped there
+    taps : what taps between the curves have met; None without taps
     shape_curvatures : (n, 2), estimates of the principal curvatures, in order, of the shape that few facets
         stand for; none where the mesh is fine or unknown
-    known_height_std : mean_height_std, if it is known already
-    known_curves : the contours as Curves of one touch, in the world, if they are known already
+    known_height_std : mean_height_std, if it was computed before
+    known_curves : the contours as Curves of one touch, in the world, if they were computed before
 
     All else is computed from these when it is first used, so contours and strokes are copies that cannot be
     written to.
@@ -82,7 +82,7 @@ class Reconstruction(Judged):
     def __post_init__(self) -> None:
         copies = tuple(contour.copied() for contour in self.contours)
         arrays = {name: read_only(getattr(self, name)) for name in ("strokes", "point", "shape_curvatures")}
-        vars(self).update(contours=copies, **arrays)
+        set_fields(self, contours=copies, **arrays)
 
     def __repr__(self) -> str:
         point = ", ".join(f"{x:.4g}" for x in self.frame.origin)
@@ -113,7 +113,7 @@ class Reconstruction(Judged):
 
     @cached_property
     def contacts(self) -> Array:
-        """The fitted contacts besides the reference point, (n, 3), in the frame."""
+        """The fitted contacts without the reference point, (n, 3), in the frame."""
         curves = zip(self.contours, self._off_point, strict=True)
         points = np.concatenate([*(contour.points[off] for contour, off in curves), self.strokes])
         return self.frame.to_local(points)
@@ -256,7 +256,7 @@ class Reconstruction(Judged):
         """How unevenly the surface bends along the curves."""
         fitted = float(self.posterior.noise)
         noises = [fitted if c.noise is None else c.noise / self.radius for c in self.contours]
-        contours, most = self.contours, OUTLYING * max(fitted, MISFIT) * self.radius
+        contours, most = self.contours, SIGNIFICANT * max(fitted, MISFIT) * self.radius
         if self._departures.max() > most:
             contours = tuple(self._explained(c, most) if c.normals is None else c for c in contours)
         noise, terms = max(noises, default=0.0), self.posterior.polynomial[2:FREE]
@@ -395,11 +395,11 @@ class Reconstruction(Judged):
         if status.is_on_flat_face(bent, std, self.contours, self.frame.origin):
             yield Doubt("flat_face", bent, std, useless=useless)
         yield from beyond("folds", self.bends.folded, status.DOUBTFUL_FOLD, useless)
-        yield from beyond("bend", self.curvature_contradiction, status.SIGNIFICANT, useless)
+        yield from beyond("bend", self.curvature_contradiction, SIGNIFICANT, useless)
 
     @property
     def _notes(self) -> str:
-        """What is to be known whatever the status: sentences, each after a space."""
+        """Remarks that do not depend on the status: sentences, each after a space."""
         message = ""
         if self.taps is not None and self.taps.missed:
             missed, number = self.taps.missed, self.taps.number
@@ -416,7 +416,7 @@ class Reconstruction(Judged):
     @cached_property
     def curve_contradiction(self) -> tuple[float, float]:
         """The number of deviations, and the share of L, by which a curve is off what the others show."""
-        if self.method != "bayes" or len(self.contours) + (len(self.strokes) > 0) < ENOUGH:
+        if self.method != "bayes" or len(self.contours) + (len(self.strokes) > 0) < LEAST_CURVES:
             return 0.0, 0.0
         sizes = [int(np.count_nonzero(counted)) for counted in self._off_point]
         curve = np.repeat([*range(len(sizes)), -1], [*sizes, len(self.strokes)])

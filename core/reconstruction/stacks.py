@@ -22,7 +22,7 @@ from ..patch.geometry import Geometry
 from ..patch.monge import TERMS, HeightField, MongePatch, monomials
 from .options import FitOptions
 from .result import Reconstruction
-from .start import Given, Start, away_from, curves_start, domain_of, strokes_start
+from .start import Start, TouchContacts, away_from, curves_start, domain_of, strokes_start
 
 
 class _Fit(NamedTuple):
@@ -37,7 +37,7 @@ class _Fit(NamedTuple):
 
 
 def fitted_stack(
-    points: Array, touches: Sequence[Given], outward: Array, options: FitOptions
+    points: Array, touches: Sequence[TouchContacts], outward: Array, options: FitOptions
 ) -> list[Reconstruction | DegenerateCurvesError]:
     """The results of touches whose arguments are checked; either all of them have contours or none has."""
     if touches[0].strokes_only:

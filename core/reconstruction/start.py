@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..bayes.joint_fit import MISFIT
+from ..contours.common_point import MAX_OFFSET
 from ..contours.contour import SURFACE_ENDS, Contour
 from ..contours.curves import (
     LEAST_CONTACTS,
@@ -31,11 +32,10 @@ from ..patch.domain import AT_POINT, Domain, closed_spline_domain
 from .options import FitOptions
 from .strokes import STRIPS, FirstFrame, first_frame, means, toward_farthest
 
-AWAY = 0.1  # Beyond this share of a curve's size, the point is not on it.
 TOUCH_ROUNDING = 1e-3  # Far from the origin rounding may take this share of a touch; MISFIT has room for it.
 
 
-class Given(NamedTuple):
+class TouchContacts(NamedTuple):
     """The contacts of one touch: contours, and strokes (n, 3) as `gathered` has them."""
 
     contours: list[Contour]
@@ -65,7 +65,7 @@ class Start(NamedTuple):
     curves: Curves  # relative to the points, in the world
     strokes: list[Array]  # (m, 3) each, in the axes and in unit radius
     stds: Array  # (b,)
-    stds_are_known: NDArray[np.bool_]  # (b,), to be all of the noise; of means it is more
+    stds_are_known: NDArray[np.bool_]  # (b,), whether stds are all of the noise; that of means is more
     point_stds: Array  # (b,), of the points along the normal; infinite where only contacts show the surface
 
     @property
@@ -99,23 +99,25 @@ class Start(NamedTuple):
 Started = tuple[Start | None, list[list[Contour]], list[DegenerateCurvesError | None]]
 
 
-def curves_start(points: Array, given: Sequence[Given], outward: Array, options: FitOptions) -> Started:
+def curves_start(
+    points: Array, touches: Sequence[TouchContacts], outward: Array, options: FitOptions
+) -> Started:
     """The start of fits to contours, with or without strokes; the thinned contours; and errors."""
-    thin = [[thinned(c, point) for c in touch.contours] for point, touch in zip(points, given, strict=True)]
-    touches = [[contour for contour, _ in c] for c in thin]
-    curves = curves_through(*stacked(points, touches))
+    thin = [[thinned(c, point) for c in touch.contours] for point, touch in zip(points, touches, strict=True)]
+    contours = [[contour for contour, _ in of_touch] for of_touch in thin]
+    curves = curves_through(*stacked(points, contours))
     normals = surface_normals(curves.tangents, outward)
-    errors = _errors(points, touches, curves, normals)
+    errors = _errors(points, contours, curves, normals)
     good = [i for i, error in enumerate(errors) if error is None]
     if not good:
-        return None, touches, errors
-    chosen = [given[i] for i in good], [thin[i] for i in good], curves.at(good), normals[good]
-    return _start(points[good], *chosen, options), touches, errors
+        return None, contours, errors
+    chosen = [touches[i] for i in good], [thin[i] for i in good], curves.at(good), normals[good]
+    return _start(points[good], *chosen, options), contours, errors
 
 
 def _start(
     points: Array,
-    given: Sequence[Given],
+    touches: Sequence[TouchContacts],
     thin: Sequence[Sequence[tuple[Contour, int]]],
     curves: Curves,
     normals: Array,
@@ -127,7 +129,7 @@ def _start(
     """
     axes, kappas, radii = darboux_frames(curves, normals)
     strokes, stds, known, point_stds = [], [], [], []
-    for i, (point, touch, thin_curves) in enumerate(zip(points, given, thin, strict=True)):
+    for i, (point, touch, thin_curves) in enumerate(zip(points, touches, thin, strict=True)):
         contours = [contour for contour, _ in thin_curves]
         contacts, size = _stroke_means(curves.at(i), contours, axes[i], radii[i], point, touch)
         noises = [*(c.noise or 0.0 for c in contours), touch.noise / math.sqrt(size)]
@@ -142,32 +144,32 @@ def _start(
 
 
 def _errors(
-    points: Array, touches: list[list[Contour]], curves: Curves, normals: Array
+    points: Array, contours: list[list[Contour]], curves: Curves, normals: Array
 ) -> list[DegenerateCurvesError | None]:
     """Why each touch with these curves and normals (b, 3) carries no frame, or None."""
-    with_curves = zip(touches, curves.present, curves.tangents, normals, strict=True)
+    touches = zip(contours, curves.present, curves.tangents, normals, strict=True)
     apart, reach = np.spacing(np.abs(points)).max(axis=1), np.abs(curves.points).max(axis=(1, 2, 3))
     errors = [
         degeneracy(*touch) or (too_coarse(gap, size) if gap > TOUCH_ROUNDING * size else None)
-        for touch, gap, size in zip(with_curves, apart, reach, strict=True)
+        for touch, gap, size in zip(touches, apart, reach, strict=True)
     ]
     return [
-        error and (away_from(point, contours) or error)
-        for error, point, contours in zip(errors, points, touches, strict=True)
+        error and (away_from(point, of_touch) or error)
+        for error, point, of_touch in zip(errors, points, contours, strict=True)
     ]
 
 
 def away_from(point: Array, contours: Sequence[Contour]) -> DegenerateCurvesError | None:
-    """The error that names the curve which passes the point farthest off, if it is AWAY; else None.
+    """The error that names the curve which passes the point farthest off, if it is by MAX_OFFSET; else None.
 
     Both its nearest contact and its line there are, because at a corner only the line is. Too few curves or
-    contacts are errors of their own.
+    contacts have other errors.
     """
     if len(contours) < 3 or min(len(contour.points) for contour in contours) <= LEAST_CONTACTS:
         return None
     distances = misses(curves_through(*stacked(point[None], [contours])))[0, :, 0]
     away = [
-        miss if min(contour.distance_to(point), miss) > AWAY * contour.size else 0.0
+        miss if min(contour.distance_to(point), miss) > MAX_OFFSET * contour.size else 0.0
         for miss, contour in zip(distances, contours, strict=True)
     ]
     worst = int(np.argmax(away))
@@ -180,10 +182,10 @@ def away_from(point: Array, contours: Sequence[Contour]) -> DegenerateCurvesErro
 
 
 def _point_std(point: Array, contours: Sequence[Contour], options: FitOptions, radius: float) -> float:
-    """The standard deviation of a reference point along the normal, before contacts are known, a length.
+    """The prior standard deviation of a reference point along the normal, a length.
 
-    A point that is a contact of a curve was touched, and has its noise. Any other was found from the
-    contacts, or set beside them: only they show where the surface is.
+    A point that is a contact of a curve was touched, and has its noise. Any other was computed from the
+    contacts, or set elsewhere: only contacts show where the surface is.
     """
     if options.point_std is not None:
         return options.point_std
@@ -194,27 +196,32 @@ def _point_std(point: Array, contours: Sequence[Contour], options: FitOptions, r
 
 
 def _std(noise: float | None, size: int, known: list[float]) -> float:
-    """The least deviation of contacts, each a mean of `size` with this noise, or the largest known one."""
+    """The least deviation of contacts, each a mean of `size` with this noise, or the largest of `known`."""
     return max(known) if noise is None else noise / math.sqrt(size)
 
 
 def _stroke_means(
-    curves: Curves, contours: Sequence[Contour], axes: Array, radius: float, point: Array, given: Given
+    curves: Curves,
+    contours: Sequence[Contour],
+    axes: Array,
+    radius: float,
+    point: Array,
+    touch: TouchContacts,
 ) -> tuple[Array, int]:
     """Strokes (n, 3) over the domain of curves as means, in unit radius; the least number in a mean.
 
     None are over curves that bound no domain.
     """
-    if not len(given.strokes):
-        return given.strokes, 1
-    local = (given.strokes - point) @ axes / radius
+    if not len(touch.strokes):
+        return touch.strokes, 1
+    local = (touch.strokes - point) @ axes / radius
     local_curves = curves._replace(points=curves.points @ axes / radius, tangents=curves.tangents @ axes)
     try:
         domain = domain_of(local_curves, contours)
     except ValueError:
         return local[:0], 1
     over = domain.contains(local[:, 0], local[:, 1]) & (np.abs(local[:, 2]) <= 1.0)
-    return _means(local[over], given.when[over])
+    return _means(local[over], touch.when[over])
 
 
 def _means(contacts: Array, when: NDArray[np.intp]) -> tuple[Array, int]:
@@ -223,12 +230,16 @@ def _means(contacts: Array, when: NDArray[np.intp]) -> tuple[Array, int]:
 
 
 def strokes_start(
-    points: Array, given: Sequence[Given], outward: Array, noise: float | None, radius: float | None
+    points: Array,
+    touches: Sequence[TouchContacts],
+    outward: Array,
+    noise: float | None,
+    radius: float | None,
 ) -> Started:
     """What `curves_start` gives, for touches of strokes without contours."""
     frames = [
         first_frame(touch.strokes - point, up, radius)
-        for point, touch, up in zip(points, given, outward, strict=True)
+        for point, touch, up in zip(points, touches, outward, strict=True)
     ]
     for i, gap in enumerate(np.spacing(np.abs(points)).max(axis=1)):
         first = frames[i]
@@ -236,11 +247,11 @@ def strokes_start(
             frames[i] = too_coarse(gap, first.radius)
     errors = [None if isinstance(first, FirstFrame) else first for first in frames]
     firsts = {i: first for i, first in enumerate(frames) if isinstance(first, FirstFrame)}
-    none: list[list[Contour]] = [[] for _ in given]
+    none: list[list[Contour]] = [[] for _ in touches]
     if not firsts:
         return None, none, errors
     good = list(firsts)
-    thin = [_means(first.contacts, given[i].when[first.used]) for i, first in firsts.items()]
+    thin = [_means(first.contacts, touches[i].when[first.used]) for i, first in firsts.items()]
     sizes = zip(good, (size for _, size in thin), strict=True)
     start = Start(
         points=points[good],
@@ -249,7 +260,7 @@ def strokes_start(
         radii=np.array([first.radius for first in firsts.values()]),
         curves=curves_through(*stacked(points[good], [[]] * len(good))),
         strokes=[contacts for contacts, _ in thin],
-        stds=np.array([_std(noise, size, [given[i].noise / math.sqrt(size)]) for i, size in sizes]),
+        stds=np.array([_std(noise, size, [touches[i].noise / math.sqrt(size)]) for i, size in sizes]),
         stds_are_known=np.zeros(len(good), dtype=bool),
         point_stds=np.full(len(good), np.inf),
     )

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import Array
+from ..bayes.normals import SLOPE_MISFIT
 from ..bayes.posterior import CONFIDENCE, SurfacePosterior
 from ..contours.contour import SURFACE_ENDS, UNEXPLAINED, Contour, unit_normals
-from ..verdict import FROM_EDGE, LONGER, SHORTER, SUBDIVIDE, Doubt, beyond
+from ..verdict import FROM_EDGE, LONGER, SHORTER, SIGNIFICANT, SUBDIVIDE, Doubt, beyond
 
-# benchmarks.stability chose these, and benchmarks.real LIKELY and those of taps. A fit is in doubt beyond
-# them.
+# A fit is in doubt beyond these. benchmarks.stability chose them, benchmarks.real LIKELY and those of taps.
 DOUBTFUL_STD = 0.02  # Mean deviation of the height over the domain, as a share of the radius.
 DOUBTFUL_WAVES = 0.012  # What a quartic leaves of a rough surface along its curves, as a share of the radius.
 DOUBTFUL_CONDITION = 1e3  # The factor by which plain least squares amplifies noise.
@@ -24,21 +24,21 @@ DOUBTFUL_CURVATURE = 0.1  # Deviation of a curvature times the radius: that of c
 # Mean curvature times the radius of a curve of few bends (benchmarks.curvatures: folds of 15 and 20 degrees).
 # With less, a default cylinder is in doubt at its rim.
 DOUBTFUL_FOLD = 0.2
-DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve may miss the point, if it is
+DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve misses the point, if it is SIGNIFICANT as well.
 OWN_POINT = 1e-6  # A contact that is nearer to the point, in unit radius, is the point.
-SIGNIFICANT = 5.0  # this many standard deviations as well.
 # Scatter counts as at least this share of a contact's noise: few contacts may scatter less.
 LEAST_SCATTER = 0.3
-# Angle in radians by which normals contradict the contacts, if it is SIGNIFICANT as well.
-CONTRADICTED = 0.01
 # Angle in radians by which normals are off the curves, and the least multiple of their deviation that it is.
 SCATTERED, SCATTERED_DEVIATIONS = 0.15, 3.0
 CONTRADICTING_CURVE = 7.0  # Deviations by which half of a curve is off what the others show.
 DOUBTFUL_FIT = 0.01  # Share of the radius by which half of the contacts are off, beyond their noise.
 CONTRADICTING = 2.0  # Mean number of deviations by which the surface is off the patch between the curves.
-FLAT = 0.5  # A point is on a flat face if more than this share of the contacts, those around it,
-FLAT_COSINE = math.cos(math.radians(0.5))  # have its normal, to half a degree. Its curvature is then below
-BENT, BENT_DEVIATIONS = 0.02, 3.0  # this share of 1 / radius, or this many deviations (tests of core.scan).
+# A point is on a flat face if more than this share of the contacts, those next to it, have its normal to half
+# a degree.
+FLAT_SHARE, FLAT_COSINE = 0.5, math.cos(math.radians(0.5))
+# A patch bends there if its curvature is above this share of 1 / radius and this number of deviations (tests
+# of core.scan).
+BENT, BENT_DEVIATIONS = 0.02, 3.0
 # The curvature is that of facets if it is off all estimates of the shape's by this share of the larger one,
 # and by this multiple of what estimates are apart (benchmarks.facets --models).
 OFF_SHAPE, DISAGREEING = 0.21, 1.5
@@ -46,7 +46,7 @@ DOUBTFUL_GAP = 0.04  # Share of the area that has no surface: near a straight ed
 
 
 class Taps(NamedTuple):
-    """What a finger that tapped between the curves has found.
+    """What taps of the finger between the curves have met.
 
     number : how often it tapped
     missed : how often it met no surface within the radius
@@ -89,7 +89,7 @@ def about_taps(taps: Taps | None, is_at_edge: bool, useless: tuple[str, ...]) ->
 def about_facets(off: Sequence[float], shape: Array) -> Iterator[Doubt]:
     """Whether few facets have other principal curvatures than the shape that they stand for.
 
-    off : n numbers, how far those found are off estimates of the shape's; shape : (n, 2), these
+    off : n numbers, how far the patch's curvatures are off estimates of the shape's; shape : (n, 2), these
     """
     if not off:
         return
@@ -120,10 +120,10 @@ def about_point(
 
 
 def about_normals(contradiction: tuple[float, float], scatter: tuple[float, float]) -> Iterator[Doubt]:
-    """Whether measured normals are off what was found: numbers of deviations, and angles in radians."""
+    """Whether measured normals contradict the contacts: numbers of deviations, and angles in radians."""
     deviations, angle = contradiction
-    if deviations > SIGNIFICANT and angle > CONTRADICTED:
-        yield Doubt("normals", angle, max(CONTRADICTED, SIGNIFICANT * angle / deviations))
+    if deviations > SIGNIFICANT and angle > SLOPE_MISFIT:
+        yield Doubt("normals", angle, max(SLOPE_MISFIT, SIGNIFICANT * angle / deviations))
     deviations, angle = scatter
     if deviations > SCATTERED_DEVIATIONS and angle > SCATTERED:
         explained = max(SCATTERED, SCATTERED_DEVIATIONS * angle / deviations)
@@ -150,7 +150,7 @@ def about_frame(
 
 def is_on_flat_face(bent: float, std: float, contours: Sequence[Contour], origin: Array) -> bool:
     """Whether the point is on a flat face, although it bends by a curvature with this deviation, in 1 / L."""
-    return bent > max(BENT, BENT_DEVIATIONS * std) and _flat_share(contours, origin) > FLAT
+    return bent > max(BENT, BENT_DEVIATIONS * std) and _flat_share(contours, origin) > FLAT_SHARE
 
 
 def _flat_share(contours: Sequence[Contour], origin: Array) -> float:

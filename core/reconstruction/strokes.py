@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strokes: curves that do not pass through the reference point, and the frame that they show by themselves.
+"""Strokes: curves that do not pass through the reference point, and the frame of strokes without contours.
 
 A robot that wipes over an object has thousands of them, with noise in all directions, but the fit takes their
 places in the tangent plane for exact. So it gets means of neighbors, in which this noise averages out. Their
@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arguments import LARGEST, SMALLEST, Array, finite_array, list_of, many
+from ..arguments import DECIMALS, LARGEST, SMALLEST, Array, finite_array, list_of, many
 from ..bayes.joint_fit import frame_update
 from ..contours.contour import Contour, cross, equal_points
 from ..contours.local_geometry import DegenerateCurvesError
@@ -27,10 +27,10 @@ ROWS = 4  # A mean consists of contacts of at least this many rows, on average.
 STROKE_CELL = 0.02  # Contacts in a square with sides of this share of the radius count as one place.
 FIRST_REACH = 0.5  # The first quadric is fitted within this share of the largest distance, if that suffices.
 DETERMINED = 0.02  # It suffices if the least singular value of its terms, averaged over contacts, is larger.
-OPEN = 1e-3  # Terms of a quartic below this share of the largest singular value are left out.
-STRAY = 2.0  # Contacts that are farther away than all others by this factor do not belong to the surface,
-FEW = 0.02  # if they are at most this share of all.
-DECIMALS = 9  # Places of contacts are compared to this decimal, so that rounding does not choose.
+UNDETERMINED = 1e-3  # Terms of a quartic below this share of the largest singular value are left out.
+# Contacts that are farther away than all others by this factor do not belong to the surface, if they are at
+# most this share of all.
+STRAY_FACTOR, STRAY_SHARE = 2.0, 0.02
 
 
 class FirstFrame(NamedTuple):
@@ -105,7 +105,7 @@ def means(contacts: Array, along: Array, when: NDArray[np.intp]) -> tuple[Array,
     over, turn = contacts[order], np.array([[along[0], -along[1]], [along[1], along[0]]])
     basis = monomials(over[:, :2] @ turn, QUARTIC)
     # Singular values of the contacts are roots of those of their normal equations.
-    quartic = np.linalg.pinv(basis.T @ basis, rcond=OPEN**2, hermitian=True) @ (basis.T @ over[:, 2])
+    quartic = np.linalg.pinv(basis.T @ basis, rcond=UNDETERMINED**2, hermitian=True) @ (basis.T @ over[:, 2])
     over[:, 2] -= basis @ quartic
     averages: Array = np.add.reduceat(over, starts, axis=0) / counts
     averages[:, 2] += monomials(averages[:, :2] @ turn, QUARTIC) @ quartic
@@ -126,11 +126,13 @@ def _groups(flat: Array, along: Array, strips: int) -> NDArray[np.intp]:
     cells = places.round().astype(np.intp) @ [1, round(4.0 / STROKE_CELL)]
     cells -= cells.min()
     shares = 1.0 / np.bincount(cells)[cells]
-    first = _equal(shares, np.lexsort((across, run)), np.zeros(len(flat), dtype=np.intp), strips)
-    return strips * first + _equal(shares, np.lexsort((across, first)), first, strips)
+    first = _equal_parts(shares, np.lexsort((across, run)), np.zeros(len(flat), dtype=np.intp), strips)
+    return strips * first + _equal_parts(shares, np.lexsort((across, first)), first, strips)
 
 
-def _equal(shares: Array, order: NDArray[np.intp], within: NDArray[np.intp], parts: int) -> NDArray[np.intp]:
+def _equal_parts(
+    shares: Array, order: NDArray[np.intp], within: NDArray[np.intp], parts: int
+) -> NDArray[np.intp]:
     """The part (n,) of each contact if each group of `within`, in this order, is cut into equal shares."""
     passed = np.cumsum(shares[order]) - 0.5 * shares[order]
     totals = np.bincount(within, shares)
@@ -187,9 +189,9 @@ def toward_farthest(points: Array) -> Array:
 
 
 def _farthest(distances: Array) -> float:
-    """The largest of the distances (n,), except of strays: the last FEW, beyond a gap by the factor STRAY."""
-    last = np.sort(distances)[-1 - int(FEW * len(distances)) :]
-    gaps = np.flatnonzero(last[1:] > STRAY * last[:-1])
+    """The largest of the distances (n,), without the few that are beyond a gap by STRAY_FACTOR."""
+    last = np.sort(distances)[-1 - int(STRAY_SHARE * len(distances)) :]
+    gaps = np.flatnonzero(last[1:] > STRAY_FACTOR * last[:-1])
     return float(last[gaps[0] if len(gaps) else -1]) if len(last) else 0.0
 
 

@@ -17,17 +17,16 @@ DOUBLED, INWARD = "doubled", "inward"
 # A mesh is doubled if more of its faces are than this share: where vertices of the pear of docs/scans.md
 # coincide, it has two such faces.
 DOUBLED_SHARE = 0.01
-SHELLS = 8  # At most so many shells, those of the largest negative volumes, are looked at.
+MOST_SHELLS = 8  # At most this number of shells, those of the largest negative volumes, is tested.
 INSIDE_OUT = -0.75  # The winding number before a face: 0 of a solid, -1/2 of a sheet, -1 if inside out.
-
-SIDES_AT_ONCE = 500_000  # A look at ten million faces takes 2 GB, and took 12 with all sides at once.
+SIDES_AT_ONCE = 500_000  # Ten million faces take 2 GB of memory, and took 12 with all sides at once.
 
 
 class _Sides(NamedTuple):
     """The sides (k,) of all faces: the vertices where they start and end, and their faces.
 
-    rims : (r,), the sides that have their edge alone
-    pairs : (p, 2), the two sides along each edge that has two
+    rims : (r,), the sides on whose edge no other side is
+    pairs : (p, 2), the two sides on each edge that has two
     """
 
     start: Indices
@@ -127,7 +126,7 @@ def _is_inside_out(points: Array, sides: _Sides, hubs: Indices) -> bool:
     np.add.at(middles, rims, at[sides.start[sides.rims]])
     middles /= np.maximum(np.bincount(rims, minlength=shells), 1)[:, None]
     volumes -= row_dot(middles, areas)
-    for number in np.argsort(volumes)[:SHELLS]:
+    for number in np.argsort(volumes)[:MOST_SHELLS]:
         if volumes[number] >= 0.0:
             break
         own = np.flatnonzero(shell == number)

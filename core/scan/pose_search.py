@@ -30,7 +30,7 @@ TRIED_TURNS = 36
 POLYNOMIAL_RIDGE = 1e-3  # It keeps a polynomial with few points flat.
 COARSE_CONTACTS = 60  # The largest number of contacts in the coarse search.
 COARSE_PLACES, COARSE_STEPS = 400, 8  # Numbers of places and of their steps to planes of nearest triangles,
-FINE, FINE_STEPS = 24, 20  # and of those that then move to the triangles themselves.
+FINE_PLACES, FINE_STEPS = 24, 20  # and of those that then move to the triangles themselves.
 SETTLED_GAIN = 1e-5  # A place has settled when a step lowers the sum of squares by a smaller share.
 NEAREST_TRIANGLES = 16  # The number of triangles to which distances are measured.
 SAME_PLACE, SAME_TURN = 0.05, math.radians(2.0)  # Poses that differ by less count as one.
@@ -66,7 +66,7 @@ def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: 
     Raises ValueError for bad arguments, and for a mesh that is smaller or very much larger than the patch.
 
     >>> pose, *others = register(r, vertices, faces)  # doctest: +SKIP
-    >>> there = r.contours[0].points @ pose.rotation.T + pose.translation  # doctest: +SKIP
+    >>> placed = r.contours[0].points @ pose.rotation.T + pose.translation  # doctest: +SKIP
     """
     if not isinstance(best, int | np.integer) or best < 1:
         raise ValueError(f"best: expected a whole number of 1 or more, got {shown(best)}")
@@ -110,7 +110,7 @@ def _initial_poses(oriented: Array, mesh: ScanMesh) -> Array:
     places = places[order // TRIED_TURNS]
     places[..., :3] = places[..., :3] @ turns[order % TRIED_TURNS]
     places, residuals, _ = _registered(places, oriented, mesh, 1, COARSE_STEPS)
-    return places[_distinct(places, residuals)[:FINE]]
+    return places[_distinct(places, residuals)[:FINE_PLACES]]
 
 
 def _fields(mesh: ScanMesh, reach: float) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 
-SORTED_AT_ONCE = 100_000  # This many points are sorted at once (benchmarks.stability_map, e20b52a).
+SORTED_AT_ONCE = 100_000  # This number of points is sorted at once (benchmarks.stability_map, e20b52a).
 JAMMED = 0.575  # A square of the spacing has this many points when no more have room, see spaced_count.
 # Only one point in each cell, this share of the spacing wide, is tested for its neighbors.
 SAMPLING_CELL = 0.5

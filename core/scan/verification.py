@@ -17,10 +17,10 @@ from ..patch.domain import GRID, Domain
 from ..patch.geometry import POINTS_AT_ONCE, Geometry, distances, fit_error, overlapped
 from ..reconstruction.result import Reconstruction
 
-EXTRA = 9  # The number of contours that are tracked besides, as in the paper's Fig. 3.
-# benchmarks.scans of e20b52a printed what is found with these.
+EXTRA = 9  # The number of contours that are tracked in addition, as in the paper's Fig. 3.
+# benchmarks.scans of e20b52a judged these.
 STEPS_A_RADIUS = 12  # The number of steps of such a contour in a radius.
-FOOT_REACH = (0.01, 0.1, 1.0)  # At the point, the mesh is looked for within these shares of the radius.
+FOOT_REACH = (0.01, 0.1, 1.0)  # At the point, rays look for the mesh within these shares of the radius.
 VERTICES_AT_ONCE = 5000  # Their distances take some hundredths of a second.
 OWN_LAYER = 1e-3  # A layer within this share of the reach is the vertex's own.
 

@@ -14,7 +14,7 @@ from core import Contour, reconstruct, reconstruct_many
 from core.bayes import evidence, posterior, prior, sextic
 from core.bayes.kernel import kernel, places_factor
 from core.bayes.normals import contradiction, measured_normals, scatter, slope_equations
-from core.bayes.process_fit import process_posterior, touch_of
+from core.bayes.process_fit import process_data, process_posterior
 from core.contours.local_geometry import Frame
 from core.patch.monge import TERMS, monomials
 
@@ -434,7 +434,7 @@ def test_normals_show_the_slopes_of_the_process_too():
     flat, noise, variances = rng.uniform(-0.7, 0.7, (40, 2)), 2e-3, np.array([4e-4, 9e-4])
     contacts = np.column_stack([flat, 0.05 * np.sin(3.0 * flat[:, 0])])
     normals = np.column_stack([-0.15 * np.cos(3.0 * flat[:, 0]), np.zeros(40), np.ones(40)]) / 0.03
-    touch = touch_of(contacts, np.ones(40), normals, np.arange(40))
+    touch = process_data(contacts, np.ones(40), normals, np.arange(40))
     of_terms = prior.prior_variances(np.array(prior.USUAL_WAVINESS))
     hyper = evidence.Hyperparameters(of_terms, noise, variances)
     found = process_posterior(touch, hyper, np.zeros((22, 22)))

@@ -22,7 +22,7 @@ from core.bayes import evidence, kernel, process_fit
 from core.bayes.kernel import weighted_kernel
 from core.bayes.posterior import DISK, QUARTIC_SHARE, nodes
 from core.bayes.prior import USUAL_WAVINESS, prior_variances
-from core.bayes.process_fit import process_posterior, touch_of
+from core.bayes.process_fit import process_data, process_posterior
 from core.patch.monge import TERMS, exponents, monomials
 from core.reconstruction.next_plane import TRIED, _variance_reduction
 
@@ -78,7 +78,7 @@ def test_the_mean_by_itself_is_that_of_the_posterior(weight):
     flat = np.vstack([np.outer(REACHES[::2], [np.cos(a), np.sin(a)]) for a in np.radians([0, 60, 120])])
     contacts = np.column_stack([flat, rough(3)(flat)])
     weights = np.where(np.arange(len(flat)) % 5, 1.0, weight)
-    touch = touch_of(contacts, np.sqrt(weights), contacts[:0], np.arange(len(weights)))
+    touch = process_data(contacts, np.sqrt(weights), contacts[:0], np.arange(len(weights)))
     hyper, _ = evidence.process_hyperparameters(*touch.at_places(), 1e-3, 4e-3)
     mean, alpha = process_fit._mean_given(touch, hyper, *touch.at_places())
     whole = process_posterior(touch, hyper, np.zeros((22, 22)))
@@ -114,7 +114,7 @@ def test_mean_and_deviation_are_those_of_a_dense_gaussian_process(noise):
     _, r = touched(noise=noise)
     contacts = r.contacts / r.radius
     sizes = np.array([4e-4, 9e-4])
-    touch = touch_of(contacts, np.ones(len(contacts)), contacts[:0], np.arange(len(contacts)))
+    touch = process_data(contacts, np.ones(len(contacts)), contacts[:0], np.arange(len(contacts)))
     variances = np.minimum(prior_variances(np.array(USUAL_WAVINESS)), evidence.MOST_VARIANCE)
     hyper = evidence.Hyperparameters(variances, noise, sizes)
     surface = process_posterior(touch, hyper, np.zeros((22, 22)))
@@ -368,7 +368,7 @@ def test_the_likelihoods_are_those_of_the_heights_under_a_normal_distribution():
 def test_the_noise_may_be_all_that_a_sextic_leaves_over():
     rng = np.random.default_rng(6)
     contacts = np.column_stack([rng.uniform(-0.7, 0.7, (120, 2)), rng.normal(0.0, 0.008, 120)])
-    touch = touch_of(contacts, np.ones(120), contacts[:0], np.arange(120))
+    touch = process_data(contacts, np.ones(120), contacts[:0], np.arange(120))
     found, _ = evidence.process_hyperparameters(*touch.at_places(), 1e-3, 8e-3)
     assert found.noise > 6e-3
 

@@ -11,12 +11,12 @@ import surfaces
 from core import (
     Contour,
     SamplingPlane,
-    azimuth_of,
     explore,
     mesh_error,
     track,
     verify,
 )
+from core.reconstruction.next_plane import azimuth_of
 
 PLANES = surfaces.planes((10, 70, 130), (0, 20, -35))
 

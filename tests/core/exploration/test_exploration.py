@@ -13,9 +13,11 @@ import surfaces
 from scipy.spatial import ConvexHull
 
 import core
+from core.contours.contour import UNEXPLAINED
 from core.exploration import extent, side_by_side
 from core.exploration.extent import suffices
 from core.reconstruction.from_contours import fitted
+from core.reconstruction.next_plane import azimuth_of
 from core.reconstruction.status import DOUBTFUL_STD
 
 PLANES = [core.SamplingPlane(a) for a in np.radians([0.0, 60.0, 120.0])]
@@ -237,7 +239,7 @@ def test_all_curves_end_before_a_rib(options):
     found = explore(surface, **options)
     for contour in found.contours:
         assert contour.points[:, 0].max() < 8.5  # the rib rises from there
-        assert core.UNEXPLAINED in contour.stops
+        assert UNEXPLAINED in contour.stops
         assert reach(contour) == pytest.approx((found.extent, found.extent), rel=0.02)
     assert true_error(surface, found) < 3.0 * found.result.mean_height_std
 
@@ -376,7 +378,7 @@ def test_planes_are_added_to_what_was_felt_while_they_help():
     azimuth = core.suggest_plane(three.result)[0].azimuth
     d1 = three.result.frame.axes[:, 0]
     along = np.cos(azimuth) * d1 + np.sin(azimuth) * three.result.frame.axes[:, 1]
-    assert np.sin(core.azimuth_of(along, UP) - more.planes[3].azimuth) == pytest.approx(0.0, abs=0.02)
+    assert np.sin(azimuth_of(along, UP) - more.planes[3].azimuth) == pytest.approx(0.0, abs=0.02)
     assert true_error(wavy(), more) < true_error(wavy(), three)
 
 

@@ -11,6 +11,7 @@ import pytest
 import surfaces
 
 import core
+from core.contours.contour import UNEXPLAINED
 from core.exploration import extent
 from core.exploration.extent import TAPS_OFF
 from core.exploration.taps import layer_height, places, tapped
@@ -155,7 +156,7 @@ def test_beside_an_edge_a_touch_is_so_short_that_its_curves_have_contacts_there(
     assert found.extent > 20.0 * away
     assert core.stops_at(found.contours, (0.0, -away, 0.0)) == []
     stops = {stop for contour in found.contours for stop in contour.stops}
-    assert stops == {core.EXTENT if found.extent == FARTHEST else core.UNEXPLAINED, core.NO_CONTACT}
+    assert stops == {core.EXTENT if found.extent == FARTHEST else UNEXPLAINED, core.NO_CONTACT}
 
 
 def test_a_touch_is_in_doubt_where_the_surface_is_off_within_its_rim():

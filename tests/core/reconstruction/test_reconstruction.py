@@ -22,7 +22,6 @@ from core import (
     SamplingPlane,
     common_point,
     distances,
-    overlapped,
     reachable,
     reconstruct,
     reconstruct_many,
@@ -30,6 +29,7 @@ from core import (
 )
 from core.contours.curves import curves_through, stacked
 from core.contours.local_geometry import surface_normals
+from core.patch.geometry import overlapped
 
 
 @pytest.mark.parametrize("planes", [UPRIGHT, TILTED], ids=["upright", "tilted"])

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import surfaces
 
-from core import METHODS, UNEXPLAINED, Contour, DegenerateCurvesError, reconstruct
+from core import METHODS, Contour, DegenerateCurvesError, reconstruct
 from core.bayes.posterior import SurfacePosterior
+from core.contours.contour import UNEXPLAINED
 from core.contours.curves import curves_through, misses, stacked
 
 EXTENT = 12.0
