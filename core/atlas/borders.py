@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from ..contours.contour import vector_of
 from ..contours.finger import Contact
-from ..triangles import LEAST_DIVISOR, normalized, row_dot
+from ..triangles import LEAST_DIVISOR, normalized, row_dot, triangle_cross
 from .connectivity import Indices, split_sides
 from .finger import Finger
 from .meshing import Mesh
@@ -29,9 +29,11 @@ TURNED = 0.87  # A border has a corner where the cosine between its directions o
 STRAIGHT = 0.1  # if it is straight on both sides to this share of an edge.
 INWARD = 0.1  # Corners are felt this share of the way from there to the middle of the chord across them.
 SMOOTHINGS = 3  # This often directions of a border become the means of their neighbors'.
+UNFOLDINGS = 8  # Triangles that turn over are mended this often: most are after one.
 EARS = 2  # This often triangles with two sides on the border are left out.
 ALONG = 0.5  # Ways agree if the cosine of the angle between them is more.
 NEAREST = 12  # The nearest segment is one of this many whose middles are nearest.
+SHORT = 0.01  # Sides of the border below this share of an edge are one place.
 SAME = 1e-6  # Lengths that differ by a smaller share are the same.
 
 PLACES_AT_ONCE = 1000  # A step feels this many places.
@@ -195,18 +197,47 @@ def snapped_to_border(mesh: Mesh, border: Border) -> Mesh:
     # Where the mesh ends though the surface goes on, the way beyond is another.
     on = (np.linalg.norm(feet - vertices[at], axis=1) < REACH * edge) & (row_dot(toward, ways) > ALONG)
     vertices[at[on]] = feet[on]
-    return _cornered(_welded(mesh._replace(vertices=vertices)), border.corners)
+    return _welded(_cornered(_unfolded(mesh._replace(vertices=vertices), mesh), border.corners))
+
+
+def _unfolded(mesh: Mesh, before: Mesh) -> Mesh:
+    """The mesh without the folds that came of moving the vertices of its border.
+
+    Of a triangle that turned over the ends of a side on the border meet, and the inner vertices move to the
+    means of their neighbors.
+
+    before : the same triangles before that
+    """
+    across, vertices = triangle_cross(before.vertices[mesh.triangles]), mesh.vertices.copy()
+    sides = mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    inner = np.ones(len(vertices), dtype=bool)
+    inner[mesh.border] = False
+    on_border = ~inner[sides].any(axis=1) & np.isin(sides @ (len(inner), 1), mesh.border @ (len(inner), 1))
+    for _ in range(UNFOLDINGS):
+        over = row_dot(triangle_cross(vertices[mesh.triangles]), across) < 0.0
+        meeting = sides[on_border & over.repeat(3)]
+        vertices[meeting] = vertices[meeting].mean(axis=1, keepdims=True)
+        some = np.unique(mesh.triangles[over])
+        some = some[inner[some]]
+        if not len(some):
+            break
+        one, other = np.concatenate([sides, sides[:, ::-1]])[np.isin(np.append(*sides.T), some)].T
+        sums = [np.bincount(one, column, len(inner)) for column in vertices[other].T]
+        vertices[some] = np.stack(sums, axis=1)[some] / np.bincount(one)[some, None]
+    return mesh._replace(vertices=vertices)
 
 
 def _welded(mesh: Mesh) -> Mesh:
-    """The mesh without sides of its border that have no length, as where some vertices move into a corner."""
+    """The mesh without sides of its border that are SHORT, as where some vertices move into a corner."""
     a, b = mesh.border.T
-    same = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1) < SAME * mesh.edge
+    same = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1) < SHORT * mesh.edge
     first = np.arange(len(mesh.vertices))
     for one, two in zip(a[same].tolist(), b[same].tolist(), strict=True):
         first[first == first[two]] = first[one]
     triangles = first[mesh.triangles]
-    some = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    _, index, counts = np.unique(np.sort(triangles, axis=1), axis=0, return_inverse=True, return_counts=True)
+    # Two triangles of the same vertices, one the other's back, come of a vertex with three neighbors.
+    some = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1) & (counts[index.ravel()] == 1)
     return mesh._replace(triangles=triangles).chosen(some)
 
 

@@ -18,15 +18,15 @@ from ..steps import chunked
 from ..triangles import normalized, row_dot, triangle_cross
 from .charts import Charts
 from .connectivity import Indices
-from .field import INSIDE, Blend, distances_within_rims, nearest_sheet, sheet_facing
+from .field import INSIDE, Blend, nearest_sheet, sheet_facing
 from .indicator import Indicator
 from .lattice import Lattice, lattice_at_level, turned
 
 # python -m benchmarks.atlas --shapes judges these.
 BAND = 1.5  # Patches count within this many cells of the indicator, or pitches, of a point.
-# A sheet is about as near as another if it is less than this many pitches farther away. With 0.2 a cube along
-AS_NEAR = 0.5  # the axes has corners cut, with any an L.
 CROSSED = 0.5  # A plane that passes an edge by this many pitches counts as well, if no other crosses it.
+# Walls that meet go on to this share of their rims, which are a little short at corners: with 1 and with
+CORNER = 1.02  # 1.06 more corners of boxes and brackets are cut by over a tolerance.
 SLACK = 1.0  # A vertex is at most this many pitches outside of its cell: the tip of a crease may be there.
 SOFT = 0.07  # A vertex does not move along planes that turn less, as mean squares of their sines: with .02 a
 # surface without creases has folds, as around Suzanne's eyes (some three times as many).
@@ -43,12 +43,14 @@ class Sides(NamedTuple):
     """Sheets near the points of a lattice (n,).
 
     points : (n,), in order
-    inside, outside : the nearest sheets; if these put them elsewhere, those about as near that put them there
+    nearest : the sheets of the nearest patches
+    inside, outside : those of the nearest patches that put the points inside or outside
     side : (n,), -1 or 1 if patches put them inside or outside, and no patch near denies it; otherwise
-        0, and also beyond the rim of a single wall
+        0, and also beyond the rims of all patches
     """
 
     points: Indices
+    nearest: Blend
     inside: Blend
     outside: Blend
     side: Array
@@ -108,7 +110,7 @@ def _turned_at_creases(
     """
     lattice, edges = yield from lattice_at_level(indicator, pitch)
     layers, band = int(np.ceil(indicator.cell / pitch)) + 1, BAND * max(indicator.cell, pitch)
-    some = partial(_sides, charts, indicator.cell, pitch, band)
+    some = partial(_sides, charts, band)
     points = np.unique(lattice.ends(edges))
     fields = yield from chunked(some, PLACES_AT_ONCE, 0.6, lattice.places(points))
     for _ in range(layers):
@@ -122,50 +124,50 @@ def _turned_at_creases(
         order = np.argsort(points, kind="stable")
         points = points[order]
         fields = tuple(np.concatenate(both)[order] for both in zip(fields, parts, strict=True))
-    half = len(Blend._fields)
-    return lattice, edges, Sides(points, Blend(*fields[:half]), Blend(*fields[half:-1]), fields[-1])
+    count = len(Blend._fields)
+    nearest, inside, outside = (Blend(*fields[i * count : (i + 1) * count]) for i in range(3))
+    return lattice, edges, Sides(points, nearest, inside, outside, fields[-1])
 
 
-def _sides(charts: Charts, cell: float, pitch: float, band: float, places: Array) -> tuple[Any, ...]:
-    """The fields of the Sides of places (n, 3), by the patches within the length `band` of these.
-
-    cell : only places that are nearer to a patch have a side
-    """
+def _sides(charts: Charts, band: float, places: Array) -> tuple[Any, ...]:
+    """The fields of the Sides of places (n, 3), by the patches within the length `band` of these."""
     pairs, count = charts.pairs(places, band), len(places)
-    every, side, found = nearest_sheet(charts, pairs, count), np.zeros(count), []
-    distances, away = distances_within_rims(charts, pairs), np.full(count, np.inf)
-    np.minimum.at(away, pairs.point_index, distances)
-    number = np.bincount(pairs.point_index, minlength=count)
-    up = [np.bincount(pairs.point_index, column, count) for column in pairs.normal.T]
-    # Beyond the rims of all patches there is a side where walls meet, but none of a single wall.
-    has_side = np.linalg.norm(up, axis=0) < FACING * number
-    has_side[pairs.point_index[pairs.rho < INSIDE]] = True
-    is_near = distances <= away[pairs.point_index] + AS_NEAR * pitch
+    found, side = [*nearest_sheet(charts, pairs, count)], np.zeros(count)
     for way in (-1.0, 1.0):
-        is_there = np.sign(pairs.distance) == way
-        side += way * (np.bincount(pairs.point_index[is_there], minlength=count) > 0)
-        sheet = nearest_sheet(charts, pairs.chosen(is_there & is_near), count)
-        found += [*sheet.where((sheet.patch >= 0) & (every.distance * way <= 0.0), every)]
-    return *found, np.where(has_side & (away < cell), side, 0.0)
+        some = pairs.chosen(np.sign(pairs.distance) == way)
+        side += way * (np.bincount(some.point_index, minlength=count) > 0)
+        found += nearest_sheet(charts, some, count)
+    # A wall ends at its rim. Where it meets another, both go on to the corner.
+    up = np.stack([np.bincount(pairs.point_index, column, count) for column in pairs.normal.T], axis=1)
+    walls_meet = np.linalg.norm(up, axis=1) < FACING * np.bincount(pairs.point_index, minlength=count)
+    within = pairs.rho < np.where(walls_meet, CORNER, INSIDE)[pairs.point_index]
+    return *found, np.where(np.bincount(pairs.point_index, within, count) > 0.0, side, 0.0)
 
 
 def _planes(lattice: Lattice, sides: Sides, edges: Indices) -> tuple[Array, Blend]:
     """Places (n, 3) where the surface crosses edges (n,), and the sheets there.
 
-    The plane is that of the outer end if it crosses the edge, and otherwise that of the inner end. Where
-    neither does, it is the level of the indicator, which has no patch.
+    The plane is that of the nearest sheet at the outer or the inner end that crosses the edge. Where neither
+    does, it is the nearest one that puts an end on its side; where none of them does, it is the level of the
+    indicator, which has no patch.
     """
     one, other = lattice.ends(edges)
     is_inside = lattice.inside(one)
     inner, outer = np.where(is_inside, one, other), np.where(is_inside, other, one)
-    a = sides.inside.at(np.searchsorted(sides.points, inner))
-    b = sides.outside.at(np.searchsorted(sides.points, outer))
     origin = lattice.places(inner)
     way = lattice.places(outer) - origin
-    from_a, missed_a = _crossing(a, a.distance, a.distance + row_dot(a.normal, way))
-    from_b, missed_b = _crossing(b, b.distance - row_dot(b.normal, way), b.distance)
-    found = a.where(missed_a < missed_b, b)
-    shares, missed = np.where(missed_a < missed_b, from_a, from_b), np.minimum(missed_a, missed_b)
+    a, b = (np.searchsorted(sides.points, ends) for ends in (inner, outer))
+    found = sides.nearest.at(b)
+    shares, missed = _crossing(found, way, 1.0)
+    for sheet, end, most in (
+        (sides.nearest.at(a), 0.0, 0.0),
+        (sides.outside.at(b), 1.0, CROSSED),
+        (sides.inside.at(a), 0.0, CROSSED),
+    ):
+        share, miss = _crossing(sheet, way, end)
+        is_better = (miss < missed) & (missed >= most)
+        found = sheet.where(is_better, found)
+        shares, missed = np.where(is_better, share, shares), np.where(is_better, miss, missed)
     at_inner, at_outer = (lattice.indicator.at(places) for places in (origin, origin + way))
     level = np.clip(at_inner / np.where(at_inner > at_outer, at_inner - at_outer, 1.0), 0.0, 1.0)
     is_felt = missed < CROSSED
@@ -175,13 +177,15 @@ def _planes(lattice: Lattice, sides: Sides, edges: Indices) -> tuple[Array, Blen
     return places, found.where(is_felt, unfelt)
 
 
-def _crossing(sheet: Blend, inner: Array, outer: Array) -> tuple[Array, Array]:
+def _crossing(sheet: Blend, way: Array, end: float) -> tuple[Array, Array]:
     """Where planes cross edges (n,), as a share of these, and by how much they miss them; inf for no patch.
 
-    inner, outer : (n,), the distances of both ends from the planes
+    way : (n, 3), from the inner ends of edges to the outer ones
+    end : 0 or 1, the share of the edges at which the sheets are
     """
-    is_crossed = (sheet.patch >= 0) & (outer > inner)
-    shares = -inner / np.where(is_crossed, outer - inner, 1.0)
+    along = row_dot(sheet.normal, way)
+    is_crossed = (sheet.patch >= 0) & (along > 0.0)
+    shares = end - sheet.distance / np.where(is_crossed, along, 1.0)
     return shares, np.where(is_crossed, np.maximum(np.abs(shares - 0.5) - 0.5, 0.0), np.inf)
 
 

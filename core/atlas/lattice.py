@@ -148,22 +148,30 @@ def turned(lattice: Lattice, points: Indices) -> tuple[Lattice, Indices]:
     """The lattice with those of points (n,) turned that are simple, and these.
 
     A point is simple if the faces between it and its own side are one disk, and so are the others. Points
-    are turned in eight classes, so that no two neighbors turn at once.
+    are turned in eight classes, so that no two neighbors turn at once, and again until no other is simple.
     """
-    found, is_composed = [points[:0]], _cases()[0]
-    for which in np.ndindex(2, 2, 2):
-        parities = np.stack(np.unravel_index(points, lattice.shape), axis=1) % 2
-        some = points[(parities == which).all(axis=1)]
-        around = lattice.inside(some[:, None] + AROUND @ lattice.strides)
-        same = around[:, BESIDE] == around[:, CENTER, None]
-        count, pairs = same.sum(axis=1), same[:, :3].astype(np.intp) + same[:, :2:-1]
-        simple = (count > 0) & (count < 6)
-        simple &= ~((count == 2) & (pairs == 2).any(axis=1)) & ~((count == 4) & (pairs == 0).any(axis=1))
-        around[:, CENTER] ^= True
-        simple &= is_composed[around[:, CELLS] @ (1 << np.arange(8))].all(axis=1)
-        lattice = lattice.turn(some[simple])
-        found.append(some[simple])
-    return lattice, np.concatenate(found)
+    before = lattice
+    while len(points):
+        count = len(points)
+        for which in np.ndindex(2, 2, 2):
+            parities = np.stack(np.unravel_index(points, lattice.shape), axis=1) % 2
+            some = points[(parities == which).all(axis=1)]
+            some = some[_are_simple(lattice, some)]
+            lattice, points = lattice.turn(some), np.setdiff1d(points, some)
+        if len(points) == count:
+            break
+    return lattice, np.setxor1d(lattice.turned, before.turned)
+
+
+def _are_simple(lattice: Lattice, points: Indices) -> NDArray[np.bool_]:
+    """Which of points (n,) are simple, and leave the lattice well-composed when they are turned."""
+    around = lattice.inside(points[:, None] + AROUND @ lattice.strides)
+    same = around[:, BESIDE] == around[:, CENTER, None]
+    count, pairs = same.sum(axis=1), same[:, :3].astype(np.intp) + same[:, :2:-1]
+    simple = (count > 0) & (count < 6)
+    simple &= ~((count == 2) & (pairs == 2).any(axis=1)) & ~((count == 4) & (pairs == 0).any(axis=1))
+    around[:, CENTER] ^= True
+    return simple & _cases()[0][around[:, CELLS] @ (1 << np.arange(8))].all(axis=1)
 
 
 @cache

@@ -38,10 +38,11 @@ SMALL = 5.0  # Touches do not go on from a patch whose radius is below this many
 NARROW = 1.0  # Where a touch was in vain before, a patch needs a radius of only this many tolerances.
 SIDE_BY_SIDE = 8  # This many touches at once are faster, and still done in a tenth of a second.
 NEAR = 3.0  # A patch ends where the surface is off it by more tolerances.
-AGAIN = 3  # Where something is missing or less certain, touches go on at most this often.
+AGAIN = 5  # Where something is missing or less certain, touches go on at most this often.
 CHECKS, CHECK_SEED = 512, 0  # This many rays from outside check the surface.
 HAIR = 0.01  # Rays begin this share of their length above the surface, which they would meet.
 SHARPEST, SPIKES = 64, 16  # This many go to its sharpest vertices, and to the triangles around the sharpest.
+UNSURE = 128  # This many go to its least certain vertices: chamfers would be off by 3.8 tolerances.
 STRAIGHT = 0.5  # A ray must meet what it is aimed at if the cosine between it and the normal is more.
 JOINED = 0.5  # Joining is this share of the way to a surface that is checked.
 BORDERS = 2  # This often a mesh is moved to the borders that are felt.
@@ -365,7 +366,8 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
     Also whether each of the first CHECKS / 2 must meet something there, (CHECKS / 2,), see STRAIGHT, and the
     length of all, which ends beyond the mesh. The first CHECKS are random: one half goes to middles of
     triangles, the other to any place near the mesh. Others go to the SHARPEST vertices, whose triangles have
-    the least sum of angles there, and straight down to triangles around SPIKES of these.
+    the least sum of angles there, to the UNSURE ones of the largest deviation, and straight down to triangles
+    around SPIKES of the sharpest.
     """
     rng, mesh = np.random.default_rng(CHECK_SEED), reference.mesh
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
@@ -381,13 +383,15 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
     ahead = row_dot(reference.normals[aimed], ways)
     facing = ahead < -STRAIGHT * np.linalg.norm(ways, axis=1)
     sharpest = np.argsort(np.where(reference.is_open, np.inf, reference.angles), kind="stable")[:SHARPEST]
-    up = away[: len(sharpest)]
-    up = up * np.copysign(1.0, row_dot(up, mesh.normals[sharpest]))[:, None]
+    unsure = np.argsort(np.where(reference.is_open, 0.0, -mesh.std), kind="stable")[:UNSURE]
+    some = np.append(sharpest, unsure)
+    up = away[: len(some)]
+    up = up * np.copysign(1.0, row_dot(up, mesh.normals[some]))[:, None]
     around = np.unique(reference.fans[sharpest[:SPIKES]])
     around = around[np.linalg.norm(reference.normals[around], axis=1) > STRAIGHT]  # The others have no area.
     down = far * reference.normals[around]
-    starts = np.vstack([middle + away, mesh.vertices[sharpest] + up, centers[around] + down])
-    return starts, np.vstack([aims, mesh.vertices[sharpest], centers[around]]), facing, 3.0 * far
+    starts = np.vstack([middle + away, mesh.vertices[some] + up, centers[around] + down])
+    return starts, np.vstack([aims, mesh.vertices[some], centers[around]]), facing, 3.0 * far
 
 
 def _joined_and_refined(run: _Run) -> Steps:

@@ -10,6 +10,7 @@ import pytest
 import core
 from core.atlas.borders import Border, snapped_to_border
 from core.atlas.meshing import Mesh
+from core.triangles import triangle_cross
 from tests import solids
 
 TOLERANCE = 2e-3
@@ -91,6 +92,8 @@ def test_an_open_sheet_is_a_disc_that_ends_at_the_border_with_its_corners(polygo
     for mesh in (atlas.reference.mesh, atlas.mesh(0.012), atlas.mesh(0.04)):
         shape = solids.topology(mesh.triangles)
         assert (shape.tangled, shape.euler, shape.pieces) == (0, 1, 1)
+        if not is_bent:
+            assert (triangle_cross(mesh.vertices[mesh.triangles]) @ sheet.turn[:, 2] > -1e-15).all()
         # A bent border is between the vertices off its chords.
         room = TOLERANCE + (mesh.edge**2 / 4.0 if is_bent else 0.0)
         assert apart(border, mesh.vertices[mesh.border]) < room

@@ -8,7 +8,8 @@ from scipy.ndimage import label
 
 import core
 from core.atlas.connectivity import split_sides
-from core.atlas.dual_contouring import _held, _sides, dual_contour
+from core.atlas.dual_contouring import _held, _on_sheet, _sides, _vertices, dual_contour
+from core.atlas.field import Blend
 from core.atlas.indicator import Indicator
 from core.atlas.join import charts_of
 from core.atlas.lattice import CORNERS, Lattice, _cases, composed, lattice_at_level, turned
@@ -58,7 +59,31 @@ def test_a_patch_alone_has_no_sides_beyond_its_rim():
     (x, y), _ = charts.rim_at(np.array([0, 1])).T
     out = np.array([0.9, 1.01, 1.05, 1.11])
     places = r.frame.to_world(r.radius * np.outer(out, (x, y, 0.0)) - [0.0, 0.0, 0.01])
-    assert _sides(charts, 0.1, 0.1, 0.15, places)[-1].tolist() == [-1.0, 0.0, 0.0, 0.0]
+    assert _sides(charts, 0.15, places)[-1].tolist() == [-1.0, 0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(("degrees", "is_moved"), [(10.0, True), (30.0, False)])
+def test_a_vertex_is_moved_onto_a_wall_only_where_its_planes_face_as_the_wall_does(degrees, is_moved):
+    s = surfaces.plane()
+    r = core.explore(s, s.point, s.normal, extent=1.0).result
+    up = np.array([[np.sin(np.radians(degrees)), 0.0, np.cos(np.radians(degrees))]]) @ r.frame.axes.T
+    own = Blend(np.zeros(1), np.zeros(1), up, np.array([7]), np.zeros(1))
+    vertex = r.frame.to_world(np.array([[0.1, 0.0, 0.05]]))
+    moved, _, _, _, patch, _ = _on_sheet(charts_of([r]), 0.1, vertex, up, *own)
+    height = r.frame.to_local(moved)[0, 2]
+    assert height == pytest.approx(0.0 if is_moved else 0.05, abs=1e-6)
+    assert patch[0] == (0 if is_moved else 7)
+
+
+@pytest.mark.parametrize(("turn", "x"), [(0.1, 0.25), (0.9, 0.5 + 0.2 / np.tan(0.9))])
+def test_a_vertex_is_where_walls_meet_but_stays_where_they_hardly_turn(turn, x):
+    """Where planes turn by 6 degrees, they meet two pitches away."""
+    places = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.2]])
+    normals = np.array([[0.0, 0.0, 1.0], [np.sin(turn), 0.0, np.cos(turn)]])
+    planes = Blend(np.zeros(2), np.zeros(2), normals, np.zeros(2, dtype=np.intp), np.zeros(2))
+    both, one = np.arange(2), np.zeros(2, dtype=np.intp)
+    vertices, _ = _vertices(both, one, places, planes, np.zeros((1, 3)), 1.0)
+    assert vertices[0, 0] == pytest.approx(x, abs=0.05)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -148,6 +173,22 @@ def test_no_edge_is_a_needle_and_creases_are_as_near_as_walls(block, edge):
     assert np.abs(BLOCK.distances(mesh.vertices)).max() < 8e-3
     off = np.linalg.norm(BLOCK.edges(50)[:, None] - mesh.vertices, axis=2).min(axis=1)
     assert np.quantile(off, 0.95) < 0.6 * edge
+
+
+@pytest.fixture(scope="module")
+def cube():
+    solid = solids.block(1.0, 1.0, 1.0)
+    return solid, core.explore_object(solid, (0.3, 0.1, 1.0), solid.outward, tolerance=4e-3, rng=0)
+
+
+@pytest.mark.parametrize("share", [0.012, 0.0097, 0.008])
+def test_no_triangle_cuts_a_corner_of_a_cube(cube, share):
+    """Where no plane of a patch crosses an edge of the lattice, the rounded level cuts the corner."""
+    solid, atlas = cube
+    mesh = atlas.mesh(share * atlas.reference.indicator.size)
+    a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
+    places = np.concatenate([a, 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a), (a + b + c) / 3.0])
+    assert np.abs(solid.distances(places)).max() < 4e-3
 
 
 def test_points_beside_a_crease_are_inside_though_the_indicator_has_them_outside(block):

@@ -3,6 +3,7 @@
 """Objects with edges: closed, sharp and right from any start, with signs and intervals that are true."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -170,6 +171,15 @@ def test_the_sharpest_places_are_checked_and_touched_again():
     assert (aims[CHECKS:][:SHARPEST] == top).all(axis=1).any()
     assert CONE.distances(starts).min() > 0.0
     assert np.linalg.norm(aims - starts, axis=1).max() < length
+
+
+def test_the_least_certain_vertex_is_checked(block):
+    """Patches that round an obtuse crease are off on a strip that random rays miss."""
+    mesh, vertex = block.reference.mesh, 1234
+    std = mesh.std.copy()
+    std[vertex] = 2.0 * std.max()
+    _, aims, _, _ = rays_at(replace(block.reference, mesh=mesh._replace(std=std)))
+    assert (aims[CHECKS:] == mesh.vertices[vertex]).all(axis=1).any()
 
 
 def test_angles_around_a_vertex_are_those_of_its_triangles(block):
