@@ -13,7 +13,7 @@ from .files import contact_operators, export_operators
 from .probes import change_handlers, in_slices, operators, probe, probe_operators
 from .report import pages
 from .scene import shown
-from .sidebar import dots, panel, preferences, rows
+from .sidebar import panel, preferences, rows
 from .stability_map import map_object, map_operator
 from .viewport import drag, gizmos, overlay, pick
 from .whole_object import object_operator, surface_operators
@@ -52,7 +52,7 @@ HERE = str(Path(__file__).resolve().parent)  # It holds presets/.
 
 
 def register() -> None:
-    dots.register()
+    rows.register_dots()
     _register_classes()
     for name, kind in PROPERTIES.items():
         setattr(bpy.types.Object, name, kind)
@@ -81,4 +81,4 @@ def unregister() -> None:
     for name in PROPERTIES:
         delattr(bpy.types.Object, name)
     _unregister_classes()
-    dots.unregister()
+    rows.unregister_dots()

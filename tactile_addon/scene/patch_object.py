@@ -12,7 +12,6 @@ from mathutils import Matrix
 from ... import core
 from ..touch.touch_object import Touched
 from ..touch.types import Array, Object
-from .curves import CURVES, curves_of
 from .family import add
 from .mesh_data import (
     ABOVE,
@@ -30,10 +29,12 @@ from .mesh_data import (
     write,
 )
 from .patch_record import (
+    CURVES,
     QUANTITIES_OF_A_FIT,
     RECONSTRUCTION,
     RECORD,
     VERDICT,
+    curves_of,
     matrix_of,
     place,
 )

@@ -22,7 +22,16 @@ from ..touch import units
 from ..touch.settings import draw_chosen, draw_fit, draw_noise
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object, PanelMixin
-from ..touch.wording import curvatures, reasons, registration_summary, verdict
+from ..touch.wording import (
+    curvatures,
+    found_values,
+    main_rows,
+    other_rows,
+    plane_rows,
+    reasons,
+    registration_summary,
+    verdict,
+)
 from ..whole_object.object_report import (
     deviation,
     facets,
@@ -31,9 +40,7 @@ from ..whole_object.object_report import (
     object_rows,
     object_verdict,
 )
-from .dots import dot
-from .patch_rows import found_values, main_rows, other_rows, plane_rows
-from .rows import draw_rows, draw_sentence
+from .rows import dot, draw_rows, draw_sentence
 
 TAB = "Tactile"
 HELP = "Click on a mesh: a probe feels its surface there and keeps a patch of it with its curvatures"

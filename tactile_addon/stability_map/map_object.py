@@ -28,7 +28,7 @@ from ..scene.mesh_data import (
 from ..scene.shown import LEAST_LENGTH
 from ..scene.viewports import show_colors
 from ..touch import units
-from ..touch.arrays import read_array
+from ..touch.evaluated_mesh import read_array
 from ..touch.settings import MOST_PLANES
 from ..touch.types import Array, Object
 from ..touch.wording import fit

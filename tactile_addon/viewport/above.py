@@ -18,7 +18,7 @@ from gpu_extras.batch import batch_for_shader
 
 from ..scene.mesh_data import ABOVE
 from ..scene.patch_record import RECORD
-from ..touch.arrays import read_array
+from ..touch.evaluated_mesh import read_array
 from ..touch.types import Array, Object
 from .curves import nearer
 

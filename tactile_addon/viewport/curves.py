@@ -16,8 +16,8 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix, Vector
 
 from ... import core
-from ..scene.curves import CURVES, Curves, curves_of
 from ..scene.mesh_data import ABOVE
+from ..scene.patch_record import CURVES, Curves, curves_of
 from ..touch.types import Object
 
 # Each sampling plane has one of Okabe and Ito's colors, which color-blind readers can tell apart.

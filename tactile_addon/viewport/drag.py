@@ -12,7 +12,7 @@ from mathutils import Matrix, Vector
 from mathutils.geometry import intersect_line_plane
 
 from ..probes import anchor, probe, touch_again
-from ..scene.curves import CURVES
+from ..scene.patch_record import CURVES
 from ..touch import units
 from ..touch.settings import MOST_PLANES, STEEPEST
 from ..touch.surface import MeshSurface

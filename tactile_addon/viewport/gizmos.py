@@ -11,7 +11,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Matrix, Vector
 
 from ..probes import probe
-from ..scene.curves import CURVES
+from ..scene.patch_record import CURVES
 from ..touch.touch_object import plane_axes
 from .curves import PLANE_COLORS
 from .drag import DRAG_EXTENT, DRAG_TILT, DRAG_TURN, POINT, STEEP, ring_of, shown_probe

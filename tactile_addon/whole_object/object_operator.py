@@ -97,7 +97,7 @@ class Growing(WithTouches):
         if self._is_ending or not self._touches.found:
             return super()._stopped(context)
         self._is_ending, self.stop = True, "Discard the Surface"
-        self._touches.stop()
+        self._touches.is_stopped = True
         return {"RUNNING_MODAL"}
 
     def _leave(self, context: bpy.types.Context) -> None:

@@ -13,7 +13,7 @@ from ..probes.operators import is_in_object_mode, make_active, polls, report_don
 from ..scene import patch_record
 from ..scene.mesh_data import DEVIATION, own_mesh, values
 from ..touch import units
-from ..touch.arrays import read_array
+from ..touch.evaluated_mesh import read_array
 from ..touch.settings import length_property
 from ..touch.types import Object, Outcome, Point
 from . import whole_mesh

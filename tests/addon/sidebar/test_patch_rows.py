@@ -20,11 +20,6 @@ def millimeters(empty):
 
 
 @pytest.fixture
-def said(extension, millimeters):
-    return extension.tactile_addon.sidebar.patch_rows
-
-
-@pytest.fixture
 def wording(extension, millimeters):
     return extension.tactile_addon.touch.wording
 
@@ -87,11 +82,11 @@ def test_a_good_verdict_says_where_curvatures_are_uncertain(wording, more, is_un
     assert said == ("Good heights, to ± 0.0123 mm; curvatures are uncertain" if is_uncertain else good)
 
 
-def test_a_flat_patch_has_no_shape_index(said, empty):
+def test_a_flat_patch_has_no_shape_index(wording, empty):
     empty.ops.mesh.primitive_cube_add()
     empty.ops.tactile.pick(target="Cube", location=(0.2, 0.1, 1.0))
     (patch,) = empty.context.object.children
-    assert dict(said.other_rows(patch["tactile"].to_dict()))["Shape Index"] == "–"
+    assert dict(wording.other_rows(patch["tactile"].to_dict()))["Shape Index"] == "–"
 
 
 def test_the_verdict_says_good_and_how_good(wording):
@@ -112,11 +107,11 @@ def test_the_reasons_say_what_limits_a_good_patch(wording, empty):
     assert reason.endswith(" 3 of 6 half curves ended at a crease, before the extent.")
 
 
-def test_the_deviation_at_the_rim_stands_below_the_mean(said, ball):
-    rows = dict(said.other_rows(ball[1]))
+def test_the_deviation_at_the_rim_stands_below_the_mean(wording, ball):
+    rows = dict(wording.other_rows(ball[1]))
     mean, rim = (float(rows[key].split()[1]) for key in ("Height", "At the Rim"))
     assert 1.5 < rim / mean < 10.0
-    assert dict(said.other_rows({**ball[1], "height_std_rim": 0.04}))["At the Rim"] == "± 0.04 mm"
+    assert dict(wording.other_rows({**ball[1], "height_std_rim": 0.04}))["At the Rim"] == "± 0.04 mm"
 
 
 @pytest.mark.parametrize("status", ["uncertain", "not_converged"])
@@ -136,28 +131,28 @@ def test_the_verdict_on_an_earlier_patch_is_none(wording):
     assert wording.verdict(record("outdated")) == "Outdated: touch again"
 
 
-def test_what_was_found_stands_next_to_auto(said, ball):
+def test_what_was_found_stands_next_to_auto(wording, ball):
     _, report = ball
-    found = said.found_values(report)
+    found = wording.found_values(report)
     assert found.keys() == {"extent", "step", "degree"}
     number, unit = found["extent"].split()
     meters = {"mm": 1.0}[unit]
     assert float(number) * meters == pytest.approx(report["extent"], rel=1e-2)
-    assert said.found_values(None) == said.found_values(report | {"status": "outdated"}) == {}
+    assert wording.found_values(None) == wording.found_values(report | {"status": "outdated"}) == {}
 
 
-def test_rows_are_distinguished_by_how_they_begin(said, ball):
+def test_rows_are_distinguished_by_how_they_begin(wording, ball):
     _, report = ball
-    rows = said.main_rows(report) + said.other_rows(report)
+    rows = wording.main_rows(report) + wording.other_rows(report)
     labels = [label for label, value in rows if value]  # a heading has no value
     assert len({label[:5] for label in labels}) == len(labels) == len(set(labels))
     assert max(map(len, labels)) <= 11
 
 
-def test_every_row_says_what_it_is(said, extension, ball):
+def test_every_row_says_what_it_is(wording, extension, ball):
     _, report = ball
     addon = extension.tactile_addon
-    rows = said.main_rows(report) + said.other_rows(report) + said.plane_rows(report)
+    rows = wording.main_rows(report) + wording.other_rows(report) + wording.plane_rows(report)
     labels = [label for label, value in rows if value] + [
         "Error on 9 More Curves",
         "Total Curvature",
