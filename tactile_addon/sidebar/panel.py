@@ -9,7 +9,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface
 
 from ... import core
-from ..comparison.verify_operator import verification_rows, verification_table
+from ..comparison.operators import verification_rows, verification_table
 from ..probes import probe
 from ..probes.in_slices import draw_running
 from ..probes.operators import no_mesh

@@ -319,7 +319,7 @@ def test_a_single_thing_is_not_said_in_the_plural(extension, empty):
     found = {"target": "Cube", "vertices": 1, "overlap": 1.0, "extra_points": 9}
     found |= {"vertex_distance_mean": 0.5, "vertex_distance_max": 0.5}
     report = {"status": "ok", "radius": 1.0, "verification": found}
-    wording = addon.comparison.verify_operator
+    wording = addon.comparison.operators
     words = wording.verification_summary(report)[1]
     assert words.startswith('At 1 vertex, "Cube" is 0.5 m off the patch on average')
     found["vertices"] = 2
