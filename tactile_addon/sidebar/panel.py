@@ -157,9 +157,7 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         # This button comes and goes while a probe is dragged, so that what is above does not jump.
         if found is not None and is_outdated:
             layout.operator("tactile.update", icon="FILE_REFRESH")
-        elif found is not None and any(
-            doubt["code"] == "folds" or core.SUBDIVIDE in doubt["advice"] for doubt in record["doubts"]
-        ):
+        elif found is not None and any(core.SUBDIVIDE in doubt["advice"] for doubt in record["doubts"]):
             layout.operator("tactile.add_subdivision", icon="MOD_SUBSURF")
         if body := _folded(layout, "more", "More"):
             _draw_more(context, body, patch, record)

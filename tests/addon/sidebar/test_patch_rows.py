@@ -270,6 +270,14 @@ def test_the_button_that_helps_is_below_the_curvatures(extension, empty):
     assert names.index("κ2") < names.index("tactile.add_subdivision")
 
 
+def test_the_advice_alone_says_whether_the_button_helps(extension, empty, ball):
+    obj, record = empty.context.object, empty.context.object.children[0]["tactile"]
+    for advice, helps in (("use a shorter extent", False), (extension.core.SUBDIVIDE, True)):
+        record["doubts"] = [{"code": "folds", "sentence": "The surface turns", "advice": advice}]
+        names = [text for text, _ in drawn_of(empty, extension, obj)]
+        assert ("tactile.add_subdivision" in names) is helps
+
+
 def drawn_of(bpy, extension, obj):
     """What the panel of the result draws of an object: (text, whether it is not gray)."""
     context = SimpleNamespace(
