@@ -28,6 +28,7 @@ CLASSES = (
     *object_operators.CLASSES,
     pick.TACTILE_OT_pick,
     drag.TACTILE_OT_drag,
+    gizmos.TACTILE_GT_rim,
     gizmos.TACTILE_GGT_handles,
     *probe_operators.OPERATORS,
     *contact_operators.CLASSES,

@@ -53,6 +53,7 @@ def insert(scene: bpy.types.Scene, touched: Touched, parent: Object | None = Non
     name = f"{touched.report['source']} Patch"
     patch: Object = bpy.data.objects.new(name, bpy.data.meshes.new(name))
     patch.show_in_front = True  # It would lie in the surface it describes.
+    patch.visible_shadow = False  # Rendered, it is above that, and a rim of shadow would be around it.
     collection(scene).objects.link(patch)
     patch.data.materials.append(emission("Tactile Curvature", COLOR))
     note_added(patch)

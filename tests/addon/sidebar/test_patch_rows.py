@@ -58,6 +58,7 @@ def test_a_number_has_no_digit_beyond_the_first_one_of_its_deviation(extension, 
     assert units.say(437.2, 1, UNIT, 12.0) == "440 ± 10 mm"
     assert units.say(0.123456, 1, UNIT, 1e-9) == "0.123 ± 1e-09 mm"
     assert units.say(0.125, 1, UNIT, 0.0) == "0.125 ± 0 mm"
+    assert units.say(-2.03e-3, -1, UNIT, 4e-5) == "-0.00203 ± 0.00004 1/mm"
     assert units.say(3.34e-7, -1, UNIT, 7e-4) == "0 ± 0.0007 1/mm"
     assert units.say(-0.002, -1, UNIT, 7e-4) == "-0.002 ± 0.0007 1/mm"
     flat = {"k1": 2e-40, "k2": -1e-7, "k1_std": 0.01, "k2_std": 0.01, "radius": 1.0}
