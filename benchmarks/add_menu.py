@@ -101,7 +101,7 @@ def expected(addon, add):
     add()
     mesh = addon.touch.detached_mesh.DetachedMesh(bpy.context.object, bpy.context.evaluated_depsgraph_get())
     tolerance = addon.whole_object.object_touches.tolerance_of(mesh.size, "normal", 0.0)
-    return addon.whole_object.object_operator.expected(mesh, tolerance, 0.0)
+    return addon.whole_object.object_operators.expected(mesh, tolerance, 0.0)
 
 
 def shape_of(obj, *, merged):

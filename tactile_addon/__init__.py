@@ -8,27 +8,27 @@ from typing import Any
 import bpy
 
 from . import command_line
-from .comparison import register_operator, verify_operator
+from .comparison import operators as comparison_operators
 from .files import contact_operators, export_operators
 from .probes import change_handlers, in_slices, operators, probe, probe_operators
 from .report import pages
 from .scene import shown
-from .sidebar import dots, panel, preferences, rows
-from .stability_map import map_object, map_operator
+from .sidebar import panel, preferences, rows
+from .stability_map import map_object
 from .viewport import drag, gizmos, overlay, pick
-from .whole_object import object_operator, surface_operators
+from .whole_object import object_operators
 
 CLASSES = (
     probe.TactileProbe,
     operators.TACTILE_OT_reconstruct,
     in_slices.TACTILE_OT_stop,
-    verify_operator.TACTILE_OT_verify,
-    register_operator.TACTILE_OT_register,
-    map_operator.TACTILE_OT_stability_map,
-    object_operator.TACTILE_OT_touch_all_over,
-    *surface_operators.CLASSES,
+    comparison_operators.TACTILE_OT_verify,
+    comparison_operators.TACTILE_OT_register,
+    map_object.TACTILE_OT_stability_map,
+    *object_operators.CLASSES,
     pick.TACTILE_OT_pick,
     drag.TACTILE_OT_drag,
+    gizmos.TACTILE_GT_rim,
     gizmos.TACTILE_GGT_handles,
     *probe_operators.OPERATORS,
     *contact_operators.CLASSES,
@@ -52,7 +52,7 @@ HERE = str(Path(__file__).resolve().parent)  # It holds presets/.
 
 
 def register() -> None:
-    dots.register()
+    rows.register_dots()
     _register_classes()
     for name, kind in PROPERTIES.items():
         setattr(bpy.types.Object, name, kind)
@@ -77,8 +77,8 @@ def unregister() -> None:
     for menu, draw in MENUS:
         getattr(bpy.types, menu).remove(draw)
     pick.unregister_tool()
-    object_operator.kept.clear()
+    object_operators.kept.clear()
     for name in PROPERTIES:
         delattr(bpy.types.Object, name)
     _unregister_classes()
-    dots.unregister()
+    rows.unregister_dots()

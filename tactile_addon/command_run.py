@@ -15,8 +15,7 @@ import bpy
 
 from .. import core
 from ..core.arguments import many
-from .comparison.register_operator import Search
-from .comparison.verify_operator import verification_columns, verify_patch
+from .comparison.operators import Search, verification_columns, verify_patch
 from .files import contact_file, export_operators, measured, mesh_file, whole_file
 from .report import pages
 from .scene import patch_record

@@ -20,7 +20,7 @@ from bpy_extras.io_utils import ImportHelper
 from ... import core
 from ...core.arguments import many
 from ..probes.in_slices import InSlices, Progress
-from ..probes.operators import is_in_object_mode, make_active, report_done, report_error
+from ..probes.operators import is_in_object_mode, make_active, report_done, reports_errors
 from ..scene import patch_object
 from ..touch.settings import FitSettings, draw_fit, given, length_property
 from ..touch.types import Outcome
@@ -119,6 +119,7 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
         self._in_window = not bpy.app.background
         return self.invoke_popup(context)  # A file was dropped; without one, the file browser opens.
 
+    @reports_errors
     def execute(self, context: bpy.types.Context) -> Outcome:
         named = [str(Path(self.directory) / each.name) for each in self.files if each.name]
         self._paths = named or [self.filepath]
@@ -126,11 +127,8 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
             scale = context.scene.unit_settings.scale_length
             self._contacts = measured.read(self._paths, self.unit, scale, self.whole)
             return super().execute(context) if self.whole else self._patch(context)
-        except MemoryError:
-            error = ValueError("There are more contacts than fit into memory: use fewer of them")
-            return report_error(self, error)
-        except (OSError, ValueError) as error:
-            return report_error(self, error)
+        except MemoryError as error:
+            raise ValueError("There are more contacts than fit into memory: use fewer of them") from error
 
     def _patch(self, context: bpy.types.Context) -> Outcome:
         """Adds the patch around one point."""

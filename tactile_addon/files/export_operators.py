@@ -16,7 +16,7 @@ from bpy_extras.io_utils import ExportHelper
 from ... import core
 from ...core.arguments import many
 from ..probes import probe
-from ..probes.operators import polls, report_done, report_error
+from ..probes.operators import polls, report_done, reports_errors
 from ..scene import patch_record
 from ..touch import units
 from ..touch.types import Object, OperatorMixin, Outcome
@@ -60,11 +60,9 @@ class ObjectExport(ExportHelper, OperatorMixin):  # type: ignore[misc]  # of `in
             self.filepath = bpy.path.clean_name(written.name) + self.filename_ext
         return super().invoke(context, event)
 
+    @reports_errors
     def execute(self, context: bpy.types.Context) -> Outcome:
-        try:
-            words = self.write(self.written(context)) or "Wrote"
-        except (OSError, ValueError) as error:
-            return report_error(self, error)
+        words = self.write(self.written(context)) or "Wrote"
         return report_done(self, f'{words} "{Path(self.filepath).name}"')
 
 

@@ -14,8 +14,7 @@ import numpy as np
 
 from ... import core
 from ...core.steps import part_of
-from ..touch.single_precision import require_single
-from ..touch.touch_object import Touched, reference_axes
+from ..touch.touch_object import Touched, reference_axes, require_single
 from ..touch.touch_report import TouchReport, measures, reconstruction_report, suggestion_report
 from ..touch.types import Array, Point
 from ..whole_object.whole_surface import WholeSurface

@@ -80,7 +80,7 @@ def add(path: Path, empty: bool = False) -> list[Object]:
 def _require_readable(path: Path) -> None:
     """Raises OSError for a file that would end Blender, or of which Blender would read something else."""
     try:
-        is_wild = _has_wild_vertices(path)
+        is_wild = ARE_WILD[path.suffix.lower()](path.read_bytes())
     except ValueError as error:
         raise _unreadable(path) from error
     if is_wild:
@@ -90,22 +90,8 @@ def _require_readable(path: Path) -> None:
         )
 
 
-def _has_wild_vertices(path: Path) -> bool:
-    """Whether a .ply, .stl or .obj file has vertices whose coordinates are no finite float32 numbers.
-
-    It has none if it is a .stl or .obj file that is broken otherwise, which importers find. Raises ValueError
-    for a .ply file of whose vertices an importer might read something else.
-    """
-    data = path.read_bytes()
-    if path.suffix.lower() == ".ply":
-        return _of_ply(data)
-    try:
-        return {".stl": _of_stl, ".obj": _of_obj}[path.suffix.lower()](data)
-    except (ValueError, IndexError):
-        return False
-
-
 def _of_ply(data: bytes) -> bool:
+    """Whether vertices are wild. Raises ValueError if an importer might read something else of them."""
     rows, fields, is_text = contact_file.vertex_rows("", data)
     lines = np.frombuffer(data, np.uint8, len(data) if is_text else data.find(b"end_header"))
     if np.diff(np.flatnonzero(lines == ord("\n")), prepend=-1, append=len(lines)).max() > PLY_LINE:
@@ -138,6 +124,11 @@ def _of_lines(lines: Sequence[bytes], places: Sequence[int]) -> bool:
 
 def _are_wild(points: Array) -> bool:
     return not (np.abs(points) <= LARGEST).all()  # NaN fails every comparison.
+
+
+# Functions that tell of the bytes of a file whether it has vertices whose coordinates are no finite float32
+# numbers. It has none if it is broken otherwise, which importers find.
+ARE_WILD = {".ply": _of_ply, ".stl": _of_stl, ".obj": _of_obj}
 
 
 def _unreadable(path: Path) -> OSError:

@@ -14,7 +14,7 @@ from ..touch.settings import TARGET, UNSAVED, draw_chosen
 from ..touch.types import Object, OperatorMixin, Outcome
 from ..touch.units import duration
 from ..touch.wording import sentence
-from .operators import has_target, is_in_object_mode, report_error, target_object, waiting
+from .operators import has_target, is_in_object_mode, report_error, reports_errors, target_object, waiting
 
 # These are seconds.
 FIRST_SLICE = 0.2  # Work that takes no longer is done without slices.
@@ -70,22 +70,20 @@ class InSlices(OperatorMixin):
         self._in_window = True
         return context.window_manager.invoke_props_dialog(self, confirm_text=text)
 
+    @reports_errors
     def execute(self, context: bpy.types.Context) -> Outcome:
-        try:
-            with waiting(context):
-                self._begin(context)
-            if self._in_window:
-                return self._go_on(context)
-            self._check(context)
-            said = perf_counter()
-            for share in self._steps:
-                self._share = share
-                if self.progress and perf_counter() > said + SAY:
-                    said = perf_counter()
-                    print(self._done()[0], file=sys.stderr, flush=True)
-            return self._finish(context)
-        except ValueError as error:
-            return report_error(self, error)
+        with waiting(context):
+            self._begin(context)
+        if self._in_window:
+            return self._go_on(context)
+        self._check(context)
+        said = perf_counter()
+        for share in self._steps:
+            self._share = share
+            if self.progress and perf_counter() > said + SAY:
+                said = perf_counter()
+                print(self._done()[0], file=sys.stderr, flush=True)
+        return self._finish(context)
 
     def _go_on(self, context: bpy.types.Context) -> Outcome:
         """Starts a timer in the window, whose events do the rest of the steps in `modal`."""

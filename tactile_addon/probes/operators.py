@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The operator behind the menu entry, the scripts and the command line."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import wraps
 from typing import Any
 
 import bpy
@@ -16,6 +17,25 @@ from ..touch.wording import fit_summary, sentence
 from .probe import is_result, lock_of, patch_near, probe_of, record_of
 
 CONVERTIBLE = {"FONT": "text", "CURVE": "curve", "SURFACE": "surface", "META": "metaball"}
+
+
+def report_error(operator: bpy.types.Operator, error: Exception) -> Outcome:
+    """Lets an operator report what is wrong, and returns what ends it."""
+    operator.report({"ERROR"}, sentence(error))
+    return {"CANCELLED"}
+
+
+def reports_errors(execute: Callable[[Any, bpy.types.Context], Outcome]) -> Callable[..., Outcome]:
+    """An `execute` that reports a ValueError or an OSError as what is wrong, and ends the operator."""
+
+    @wraps(execute)
+    def reporting(self: Any, context: bpy.types.Context) -> Outcome:
+        try:
+            return execute(self, context)
+        except (OSError, ValueError) as error:
+            return report_error(self, error)
+
+    return reporting
 
 
 class TACTILE_OT_reconstruct(PlacedTouch, bpy.types.Operator):
@@ -37,19 +57,17 @@ class TACTILE_OT_reconstruct(PlacedTouch, bpy.types.Operator):
             return False  # Scripts, which have no area, need not leave a mode.
         return has_target(cls, context)
 
+    @reports_errors
     def execute(self, context: bpy.types.Context) -> Outcome:
-        try:
-            with waiting(context):
-                touched = touch(
-                    target_object(context, self.target),
-                    context.evaluated_depsgraph_get(),
-                    given(self, "location") or context.scene.cursor.location.to_tuple(),
-                    outward=given(self, "outward"),
-                    tolerance=self.tolerance if self.properties.is_property_set("tolerance") else None,
-                    **touch_arguments(self),
-                )
-        except ValueError as error:
-            return report_error(self, error)
+        with waiting(context):
+            touched = touch(
+                target_object(context, self.target),
+                context.evaluated_depsgraph_get(),
+                given(self, "location") or context.scene.cursor.location.to_tuple(),
+                outward=given(self, "outward"),
+                tolerance=self.tolerance if self.properties.is_property_set("tolerance") else None,
+                **touch_arguments(self),
+            )
         touched = completed(touched)
         make_active(context, patch_object.insert(context.scene, touched))
         return report_done(self, fit_summary(touched.report), touched.report["status"] == "ok")
@@ -64,12 +82,6 @@ class TACTILE_OT_reconstruct(PlacedTouch, bpy.types.Operator):
         draw_all(layout, self)
         is_set = self.properties.is_property_set("tolerance")
         layout.prop(self, "tolerance", text="Tolerance" if is_set else "Tolerance (Off)")
-
-
-def report_error(operator: bpy.types.Operator, error: Exception) -> Outcome:
-    """Lets an operator report what is wrong, and returns what ends it."""
-    operator.report({"ERROR"}, sentence(error))
-    return {"CANCELLED"}
 
 
 def report_done(operator: bpy.types.Operator, words: str, is_good: bool = True) -> Outcome:

@@ -20,7 +20,7 @@ from .operators import (
     make_active,
     polls,
     report_done,
-    report_error,
+    reports_errors,
     surface_of,
     target_object,
     waiting,
@@ -86,13 +86,11 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
         "Tolerance", "Standard deviation of the height to reach; 0 goes on as long as a plane helps"
     )
 
+    @reports_errors
     def execute(self, context: bpy.types.Context) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
         depsgraph = context.evaluated_depsgraph_get()
-        try:
-            touched = touch_again.touch_at(found, depsgraph, complete=True, tolerance=self.tolerance)
-        except ValueError as error:
-            return report_error(self, error)
+        touched = touch_again.touch_at(found, depsgraph, complete=True, tolerance=self.tolerance)
         settings = found.tactile_probe
         with silent():
             for plane in touched.report["added_planes"]:
@@ -124,14 +122,13 @@ class TACTILE_OT_remove_plane(_PlaneOperator, bpy.types.Operator):
     limit, why_not = 3, "A patch needs three planes"
     plane: IntProperty(name="Plane", description="Index of the plane, from 0", min=0, max=MOST_PLANES - 1)
 
+    @reports_errors
     def execute(self, context: bpy.types.Context) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
         settings = found.tactile_probe
         count = settings.plane_count
         if self.plane >= count:
-            return report_error(
-                self, ValueError(f"There are {count} planes, 0 to {count - 1}: choose one of them")
-            )
+            raise ValueError(f"There are {count} planes, 0 to {count - 1}: choose one of them")
         with silent():
             for name in ("azimuths", "tilts"):
                 values = list(getattr(settings, name))
@@ -174,14 +171,11 @@ class TACTILE_OT_add_subdivision(_ProbeOperator, bpy.types.Operator):
         hint = "Select the mesh object to subdivide, or what was felt of it"
         return polls(cls, is_mesh, hint) and is_in_object_mode(cls, context, "Modifiers are added")
 
+    @reports_errors
     def execute(self, context: bpy.types.Context) -> Outcome:
-        surface = surface_of(context)
-        try:
-            target = target_object(context, self.target)
-        except ValueError as error:
-            return report_error(self, error)
+        surface, target = surface_of(context), target_object(context, self.target)
         if not target.is_editable or target.type != "MESH":
-            return report_error(self, ValueError("The target cannot be changed: make it local first"))
+            raise ValueError("The target cannot be changed: make it local first")
         _subdivide(target)
         context.view_layer.update()  # Live probes touch again.
         if surface is not None:
@@ -227,10 +221,11 @@ class TACTILE_OT_activate(bpy.types.Operator):
 
     name: StringProperty(name="Name", description="Name of the probe", options={"SKIP_SAVE"})
 
+    @reports_errors
     def execute(self, context: bpy.types.Context) -> Outcome:
         found: Object | None = context.view_layer.objects.get(self.name)
         if found is None:
-            return report_error(self, ValueError(f'There is no probe "{self.name}" in this view layer'))
+            raise ValueError(f'There is no probe "{self.name}" in this view layer')
         make_active(context, found)
         return {"FINISHED"}
 

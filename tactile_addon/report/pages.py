@@ -21,7 +21,7 @@ from ..scene.mesh_data import DEVIATION, HEIGHT_STD, MAP_COLOR, POSITION, REASON
 from ..stability_map import map_object
 from ..stability_map.stability import NOTHING
 from ..touch import units
-from ..touch.arrays import read_array
+from ..touch.evaluated_mesh import read_array
 from ..touch.types import Array, Object
 from ..touch.wording import readable_rows, verdict
 from ..whole_object.object_report import object_summary, object_table_rows

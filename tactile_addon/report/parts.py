@@ -16,7 +16,7 @@ from ...core.triangles import triangle_cross
 from ..scene.colors import symmetric_range
 from ..scene.mesh_data import POSITION, corners_of, values
 from ..touch import units
-from ..touch.arrays import read_array
+from ..touch.evaluated_mesh import read_array
 from ..touch.types import Array
 from . import page
 

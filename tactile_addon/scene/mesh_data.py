@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..touch.arrays import read_array
+from ..touch.evaluated_mesh import read_array
 from ..touch.types import Array, Object
 from .undo import note_copied
 

@@ -12,7 +12,6 @@ from mathutils import Matrix
 from ... import core
 from ..touch.touch_object import Touched
 from ..touch.types import Array, Object
-from .curves import CURVES, curves_of
 from .family import add
 from .mesh_data import (
     ABOVE,
@@ -30,10 +29,12 @@ from .mesh_data import (
     write,
 )
 from .patch_record import (
+    CURVES,
     QUANTITIES_OF_A_FIT,
     RECONSTRUCTION,
     RECORD,
     VERDICT,
+    curves_of,
     matrix_of,
     place,
 )
@@ -52,6 +53,7 @@ def insert(scene: bpy.types.Scene, touched: Touched, parent: Object | None = Non
     name = f"{touched.report['source']} Patch"
     patch: Object = bpy.data.objects.new(name, bpy.data.meshes.new(name))
     patch.show_in_front = True  # It would lie in the surface it describes.
+    patch.visible_shadow = False  # Rendered, it is above that, and a rim of shadow would be around it.
     collection(scene).objects.link(patch)
     patch.data.materials.append(emission("Tactile Curvature", COLOR))
     note_added(patch)

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a patch object keeps: the report, the reconstruction in double precision, and where it was touched."""
+"""What a patch object keeps: report, reconstruction in double precision, where it was touched, its curves."""
 
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from mathutils import Matrix
@@ -21,6 +21,7 @@ RECONSTRUCTION = "tactile_reconstruction"  # Its core.to_dict as JSON, once a ge
 VERDICT = "tactile_verdict"  # Its status and message, while the report says that it is outdated.
 RANGE = "tactile_color_range"  # The range of its colors, if that is given.
 COMMON_RANGE = "tactile_common_range"  # That of curvatures on all patches of its mesh, in 1/length.
+CURVES = "tactile_curves"  # The Curves of a patch, which the viewport draws.
 MAP_RECORD = "tactile_map"  # The report of a stability map.
 ATLAS_RECORD = "tactile_object"  # The report of a whole object.
 GRAPH = "tactile_graph"  # The graph of a whole object, core.Atlas.to_dict as JSON.
@@ -42,6 +43,11 @@ QUANTITIES = [
 POWERS = {name: power for name, _, _, power in QUANTITIES}
 QUANTITIES_OF_A_FIT = (*CURVATURES, HEIGHT_STD)  # These need no mesh to compare with.
 POSITIVE = ("curvedness", HEIGHT_STD)  # These are never below zero, so they need half a scale.
+# By name, lists of curves with three coordinates a point, in the Darboux frame: contours, strokes (the
+# contacts beside these), rim, and directions (d1 and d2).
+Curves: TypeAlias = dict[str, list[list[float]]]
+RIM_CORNERS = 96  # The number of points of the rim.
+ALONG, POINTS = 0.4, 9  # How far a principal direction is drawn, as a share of the radius, and its points.
 
 
 def report_of(patch: Object) -> TouchReport | None:
@@ -204,3 +210,19 @@ def matrix_of(axes: Array, origin: Array) -> Array:
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = axes, origin
     return matrix
+
+
+def curves_of(result: core.Reconstruction) -> Curves:
+    """The curves of a reconstruction."""
+    to_local = result.frame.to_local
+    edge = result.domain.boundary(RIM_CORNERS)
+    along, across = np.linspace(-ALONG, ALONG, POINTS) * result.radius, np.zeros(POINTS)
+    plane = {"rim": [np.vstack([edge, edge[:1]])]}
+    plane["directions"] = [np.column_stack(pair) for pair in ((along, across), (across, along))]
+    found: dict[str, list[Array]] = {
+        name: [np.column_stack([at, result.height(*at.T)]) for at in paths] for name, paths in plane.items()
+    }
+    found["contours"] = [to_local(contour.points) for contour in result.contours]
+    if len(result.strokes):
+        found["strokes"] = [to_local(result.strokes)]
+    return {name: [path.ravel().tolist() for path in paths] for name, paths in found.items()}

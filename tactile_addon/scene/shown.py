@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from ... import core
 from ..touch import units
-from ..touch.arrays import read_array
+from ..touch.evaluated_mesh import read_array
 from ..touch.types import Array, Object
 from . import colors
 from .family import all_objects

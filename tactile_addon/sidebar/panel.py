@@ -9,7 +9,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface
 
 from ... import core
-from ..comparison.verify_operator import verification_rows, verification_table
+from ..comparison.operators import verification_rows, verification_table
 from ..probes import probe
 from ..probes.in_slices import draw_running
 from ..probes.operators import no_mesh
@@ -22,7 +22,16 @@ from ..touch import units
 from ..touch.settings import draw_chosen, draw_fit, draw_noise
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object, PanelMixin
-from ..touch.wording import curvatures, reasons, registration_summary, verdict
+from ..touch.wording import (
+    curvatures,
+    found_values,
+    main_rows,
+    other_rows,
+    plane_rows,
+    reasons,
+    registration_summary,
+    verdict,
+)
 from ..whole_object.object_report import (
     deviation,
     facets,
@@ -31,9 +40,7 @@ from ..whole_object.object_report import (
     object_rows,
     object_verdict,
 )
-from .dots import dot
-from .patch_rows import found_values, main_rows, other_rows, plane_rows
-from .rows import draw_rows, draw_sentence
+from .rows import dot, draw_rows, draw_sentence
 
 TAB = "Tactile"
 HELP = "Click on a mesh: a probe feels its surface there and keeps a patch of it with its curvatures"
@@ -150,9 +157,7 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         # This button comes and goes while a probe is dragged, so that what is above does not jump.
         if found is not None and is_outdated:
             layout.operator("tactile.update", icon="FILE_REFRESH")
-        elif found is not None and any(
-            doubt["code"] == "folds" or core.SUBDIVIDE in doubt["advice"] for doubt in record["doubts"]
-        ):
+        elif found is not None and any(core.SUBDIVIDE in doubt["advice"] for doubt in record["doubts"]):
             layout.operator("tactile.add_subdivision", icon="MOD_SUBSURF")
         if body := _folded(layout, "more", "More"):
             _draw_more(context, body, patch, record)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the sidebar draws sentences, and rows of numbers that have tooltips."""
+"""How the sidebar draws sentences, rows of numbers that have tooltips, and dots in the colors of planes."""
 
 import re
 import textwrap
@@ -8,15 +8,17 @@ from collections.abc import Sequence
 from typing import Any
 
 import blf
-import bpy
+import bpy.utils.previews
+import numpy as np
 from bpy.props import StringProperty
 
 from ..touch.types import Outcome
-from ..viewport.curves import FONT
+from ..viewport.curves import FONT, PLANE_COLORS
 from ..viewport.overlay import TEXT
 
 # About the width of a letter, and what is free around a text, in pixels at scale 1.
 LETTER, PADDING = 6.5, 12.0
+SIDE, RADIUS = 32, 10.0  # of the icon and of its dot, in pixels
 
 TIPS = {
     "κ1": "The smaller principal curvature at the point; below 0 the surface bulges outward",
@@ -57,6 +59,7 @@ TIPS = {
     "… on Facets": "Number of these that have the curvature of facets, not of the shape",
     "Without Curvature": "Number of vertices whose curvatures are unknown, beside edges and rims",
 }
+_icons = None
 
 
 def tip_of(label: str) -> str:
@@ -134,3 +137,25 @@ def draw_sentence(
 def _letters(context: bpy.types.Context) -> float:
     """About how many letters fit into a line of the sidebar."""
     return context.region.width / (LETTER * context.preferences.system.ui_scale) - 8.0
+
+
+def dot(plane: int) -> int:
+    """The number of the icon of the plane with this index, a dot."""
+    return _icons[str(plane)].icon_id
+
+
+def register_dots() -> None:
+    """Makes the dots for the rows of the sampling planes, in the colors of their handles and curves."""
+    global _icons
+    _icons = bpy.utils.previews.new()
+    x = np.arange(SIDE) - 0.5 * (SIDE - 1)
+    cover = np.clip(RADIUS + 0.5 - np.hypot(x, x[:, None]), 0.0, 1.0)
+    for plane, color in enumerate(PLANE_COLORS):
+        icon: Any = _icons.new(str(plane))
+        icon.icon_size = icon.image_size = SIDE, SIDE
+        pixels = np.dstack([*(c * cover for c in color), cover]).ravel()
+        icon.icon_pixels_float = icon.image_pixels_float = pixels.tolist()
+
+
+def unregister_dots() -> None:
+    bpy.utils.previews.remove(_icons)

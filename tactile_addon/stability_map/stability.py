@@ -14,9 +14,8 @@ import numpy as np
 from ... import core
 from ...core.triangles import cut_to_edges, triangle_cross
 from ..scene.mesh_data import MEASURES
-from ..touch.arrays import read_array
 from ..touch.detached_mesh import DetachedMesh
-from ..touch.evaluated_mesh import evaluated_object, size_of
+from ..touch.evaluated_mesh import evaluated_object, read_array, size_of
 from ..touch.touch_object import FARTHEST_SHARE, LEAST_STEPS, require_fine, require_lengths
 from ..touch.types import Array, Object, Point, Triple
 from ..touch.units import length

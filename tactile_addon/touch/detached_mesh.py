@@ -13,9 +13,15 @@ from mathutils import Matrix
 from mathutils.bvhtree import BVHTree
 
 from ... import core
-from .arrays import read_array
-from .evaluated_mesh import PlacedMesh, coordinates, evaluated_object, require_in_scene
-from .oriented import require_oriented
+from .evaluated_mesh import (
+    PlacedMesh,
+    checksum_of,
+    coordinates,
+    evaluated_object,
+    read_array,
+    require_in_scene,
+    require_oriented,
+)
 from .types import Array, Object, Point, Triple
 
 PAUSE = 50.0  # The time until the shape is compared again, as a multiple of the time that this takes.
@@ -89,8 +95,7 @@ class DetachedMesh(PlacedMesh):
             raise ValueError(f'"{self.name}" was moved while it was touched: start again')
         begin = perf_counter()
         if begin >= self._compared_until:
-            evaluated, _, _ = evaluated_object(found, context.evaluated_depsgraph_get())
-            if zlib.crc32(coordinates(evaluated).data) != self._checksum:
+            if checksum_of(found, context.evaluated_depsgraph_get()) != self._checksum:
                 raise ValueError(f'"{self.name}" was changed while it was touched: start again')
             self._compared_until = perf_counter() + PAUSE * (perf_counter() - begin)
         return found

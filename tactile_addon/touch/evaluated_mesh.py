@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mesh of an object of the scene as Blender evaluates it: its vertices, its transform, its checksum."""
+"""The mesh of an object as Blender evaluates it: its vertices, transform, checksum; a look at its faces."""
 
 import math
 import zlib
@@ -10,12 +10,23 @@ from typing import Any
 import bpy
 import numpy as np
 
-from .arrays import read_array
+from ... import core
 from .types import Array, Object, Point, Triple
 
 SHORT_SHARE = 0.05  # In most cases the mesh is within this share of the reach.
 FLATTEST = 1e6  # Scales along an object's axes differ by less, so that single precision holds its inverse.
+SEEN = 100  # The faults of this many shapes are kept, because a mesh of a million faces takes a second.
+# Where vertices are rounded by more of the size, faces coincide: touches say so by themselves.
+ROUNDED = 1e-3
 FARTHEST_VERTEX = 1e15  # Vertices are no farther away, so that single precision can hold squared distances.
+_faults: dict[tuple[int, int], str] = {}
+
+
+def read_array(items: Any, key: str, width: int = 1, dtype: Any = np.float32) -> Array:
+    """The property `key` of n items: (n,), or (n, width) for vectors."""
+    values = np.empty(width * len(items), dtype=dtype)
+    items.foreach_get(key, values)
+    return values if width == 1 else values.reshape(-1, width)
 
 
 def checksum_of(obj: Object, depsgraph: bpy.types.Depsgraph) -> int:
@@ -114,6 +125,34 @@ def require_invertible(name: str, matrix: Array) -> None:
             f'"{name}" has a scale of 0 in some direction, or {FLATTEST:g} times less than in another: '
             "give it another scale"
         )
+
+
+def require_oriented(evaluated: Object, co: Array) -> None:
+    """Raises ValueError, with a sentence, if faces of an evaluated object point inward or are doubled.
+
+    Contacts need normals that point outward, so it is looked at before the first touch.
+
+    co : (n, 3), the coordinates of its vertices
+    """
+    mesh, name = evaluated.data, evaluated.name
+    if np.spacing(np.abs(co).max()) > ROUNDED * np.ptp(co, axis=0).max():
+        return
+    index: Any = mesh.attributes.get(".corner_vert")  # It is 100 times as fast. There is none in edit mode.
+    items, key = (mesh.loops, "vertex_index") if index is None else (index.data, "value")
+    corners = read_array(items, key, dtype=np.int32)
+    shape = zlib.crc32(co.data), zlib.crc32(corners.data)
+    if shape not in _faults:
+        if len(_faults) >= SEEN:
+            _faults.clear()
+        starts = read_array(mesh.polygons, "loop_start", dtype=np.int32)
+        _faults[shape] = core.orientation_fault(co, corners, starts)
+    if _faults[shape] == core.DOUBLED:
+        raise ValueError(
+            f'"{name}" has faces that lie on others and face the opposite way: use Merge by Distance in Edit '
+            "Mode, then Recalculate Outside"
+        )
+    if _faults[shape] == core.INWARD:
+        raise ValueError(f'"{name}" has faces that point inward: use Recalculate Outside in Edit Mode')
 
 
 class PlacedMesh:

@@ -9,8 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from .evaluated_mesh import PlacedMesh, coordinates, evaluated_object, size_of
-from .oriented import require_oriented
+from .evaluated_mesh import PlacedMesh, coordinates, evaluated_object, require_oriented, size_of
 from .types import Array, Object, Point, Triple
 
 VERTICES_AT_ONCE = 100_000  # So many take some megabytes; ten million took 230.

@@ -15,7 +15,6 @@ from ... import core
 from ...core.arguments import unit_vector
 from .detached_mesh import DetachedMesh
 from .settings import MOST_PLANES, STEEPEST
-from .single_precision import require_single
 from .surface import MeshSurface
 from .touch_report import (
     TouchReport,
@@ -33,6 +32,9 @@ FINEST_STEP = 1.0 / 128.0  # The step is this share of the size if neither step 
 LEAST_STEPS = 12  # Without a step, a half contour has at least this many.
 LARGE_FACET = 4.0  # The finger feels facets that are longer than this many steps, and creases between them.
 STEP_ROUNDING = 1.0 / 20.0  # Contacts that are rounded by more of a step say nothing about curvature.
+# The squares of lengths between these, and of their inverses, are numbers in single precision.
+LARGEST_SINGLE, SMALLEST_SINGLE = 1e15, 1e-15
+PLACE_ROUNDING = 0.1  # Far from the origin rounding may move a surface by this share of its radius.
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,6 +223,26 @@ def require_fine(spacing: float, step: float) -> None:
             "too coarse "
             f"for a step of {length(step)}: move the object nearer to the origin of the world or of its own "
             "mesh"
+        )
+
+
+def require_single(what: str, radius: float, place: Array) -> None:
+    """Raises ValueError for a surface too large, too small or too far away for Blender's numbers.
+
+    what : a word for it; radius : a length; place : (3,), its middle in the world
+    """
+    far = float(np.abs(place).max())
+    if not (radius >= SMALLEST_SINGLE and radius + far <= LARGEST_SINGLE):
+        raise ValueError(
+            f"The {what} has a radius of {radius:.3g} and reaches to {radius + far:.3g}, and "
+            f"Blender's numbers range from {SMALLEST_SINGLE:g} to {LARGEST_SINGLE:g}: use another "
+            "unit of length"
+        )
+    gap = float(np.spacing(np.float32(far)))
+    if gap > PLACE_ROUNDING * radius:
+        raise ValueError(
+            f"Neighboring coordinates at the {what} are {gap:.2g} apart in single precision, too coarse for "
+            f"its radius of {radius:.3g}: move the origin of the contacts nearer to them"
         )
 
 

@@ -59,7 +59,7 @@ def say(value: float, power: int, unit: Unit, std: float | None = None) -> str:
     if std is None:
         return f"{_digits(value / scale)} {symbol(power, unit)}".strip()
     value, spread = known(value / scale, std / scale), float(f"{std / scale:.1g}")
-    return f"{value:.3g} ± {spread:g} {symbol(power, unit)}".strip()
+    return f"{_digits(value)} ± {_digits(spread)} {symbol(power, unit)}".strip()
 
 
 def _digits(number: float) -> str:

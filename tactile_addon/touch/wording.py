@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reports of patches as tables and sentences for people, and errors as sentences."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,8 @@ FORMULAS = ("=", "+", "-", "@", "\t", "\r", "\n")  # Spreadsheets run text that 
 # flat faces and cylinders, whose 0 is well known, are below .02, those of bends that noise hides up to .6.
 UNCERTAIN = 0.1
 ROUNDING = 1e-6  # A component below this share of the largest is what single precision leaves of 0.
+FLAT_DEVIATIONS = 2.0  # A curvature within this many deviations of 0 has no radius.
+FLATTEST = 1e-3  # Nor has one whose radius is a thousand times the patch's.
 
 
 def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
@@ -232,6 +234,62 @@ def _shared(report: Mapping[str, Any], key: str) -> str:
 def _length(value: float, report: Mapping[str, Any]) -> str:
     """A length of the report in words, as `rounded` has it."""
     return say_of(report, rounded(value, 1, report["radius"]))
+
+
+def main_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """(label, value) of the numbers that the sidebar shows at first, the principal curvatures."""
+    return [(label, measured(record, key, -1)) for label, key in (("κ1", "k1"), ("κ2", "k2"))]
+
+
+def other_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """(label, value) of all others that it shows."""
+    rim = record.get("height_std_rim")
+    rows = [
+        ("Height", f"± {say_of(record, record['height_std'])}"),
+        ("At the Rim", "…" if rim is None else f"± {say_of(record, rim)}"),
+        ("Deviation", said(record, "height_error", 1) if "height_error" in record else "–"),
+        *_radii(record),
+        ("K Gaussian", measured(record, "gaussian_curvature", -2)),
+        ("H Mean", measured(record, "mean_curvature", -1)),
+        ("Shape Index", "–" if is_flat(record) else f"{record['shape_index']:.2f}"),
+        ("Curvedness", said(record, "curvedness", -1)),
+        ("Fit Error", said(record, "fit_error", 1)),
+    ]
+    if record["is_verified"] and record["vertices"]:
+        rows.append(("Farthest", said(record, "vertex_distance_max", 1)))
+    for key in ("extent", "step") if "step" in record else ("radius",):
+        rows.append((key.title(), say_of(record, record[key])))
+    return [*rows, ("Degree", str(record["degree"])), ("Contacts", str(record["contacts"]))]
+
+
+def plane_rows(record: TouchReport) -> list[tuple[str, str]]:
+    """(label, value) of the plane that would lower the deviation most, once it is known."""
+    if not record["is_verified"]:
+        return []
+    plane = record["suggested_plane"]
+    return [
+        ("Suggested Plane", f"{plane['azimuth']:.0f}°"),
+        ("Expected Accuracy with It", f"± {say_of(record, plane['expected_height_std'])}"),
+    ]
+
+
+def found_values(record: Mapping[str, Any] | None) -> dict[str, str]:
+    """The values that the last touch chose for numbers left to the surface, in words and by name."""
+    if record is None or record["status"] == "outdated" or "step" not in record:
+        return {}
+    return {
+        "extent": say_of(record, record["extent"]),
+        "step": say_of(record, record["step"]),
+        "degree": str(record["degree"]),
+    }
+
+
+def _radii(record: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Rows of the radii 1 / kappa, with their deviations, if the curvatures are known not to be 0."""
+    for number in (1, 2):
+        k, std = record[f"k{number}"], record[f"k{number}_std"]
+        if abs(k) > FLAT_DEVIATIONS * std and abs(k) * record["radius"] > FLATTEST:
+            yield f"1/κ{number}", say_of(record, 1.0 / k, std=std / k**2)
 
 
 def cell(words: str) -> str:

@@ -9,7 +9,7 @@ that an export has.
 """
 
 from functools import lru_cache
-from typing import Any, cast
+from typing import Any
 
 import bpy
 import gpu
@@ -18,9 +18,9 @@ from gpu_extras.batch import batch_for_shader
 
 from ..scene.mesh_data import ABOVE
 from ..scene.patch_record import RECORD
-from ..touch.arrays import read_array
+from ..touch.evaluated_mesh import read_array
 from ..touch.types import Array, Object
-from .curves import nearer
+from .curves import coordinates
 
 DARKEST, BRIGHTEST = 0.3, 0.7  # The share of its color that a face has edge on, and upright, as in Solid.
 VERTEX = """
@@ -63,15 +63,13 @@ def draw_above() -> None:
 
 def _draw(obj: Object, height: float) -> None:
     """Draws an object this far toward the eye, to the same place on the screen."""
-    shader, pushed = _shader(), cast(Any, gpu.matrix.push_pop())  # which the stubs make no context
+    shader = _shader()
     view: Any = bpy.context.region_data
     depth = (
         -(view.view_matrix @ obj.matrix_world.translation).z if view.is_perspective else view.view_distance
     )
     share = height * obj.matrix_world.median_scale / max(depth, 1e-30)
-    with pushed:
-        gpu.matrix.load_matrix(nearer(view, min(share, 0.5)) @ gpu.matrix.get_model_view_matrix())
-        gpu.matrix.multiply_matrix(obj.matrix_world)
+    with coordinates(obj.matrix_world, min(share, 0.5)):
         shader.uniform_float("ModelViewMatrix", gpu.matrix.get_model_view_matrix())
         shader.uniform_float("ProjectionMatrix", gpu.matrix.get_projection_matrix())
         _batch(obj).draw(shader)

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The curves of patches and of a pick's preview: contours in the colors of their planes, rims, directions."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import lru_cache
 from itertools import cycle
 from typing import Any, cast
@@ -16,8 +17,8 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix, Vector
 
 from ... import core
-from ..scene.curves import CURVES, Curves, curves_of
 from ..scene.mesh_data import ABOVE
+from ..scene.patch_record import CURVES, Curves, curves_of, matrix_of
 from ..touch.types import Object
 
 # Each sampling plane has one of Okabe and Ito's colors, which color-blind readers can tell apart.
@@ -27,6 +28,7 @@ PLANE_COLORS = [
 ]  # fmt: skip
 WHITE, BLACK, DARK = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.6)
 WIDTH, OUTLINE = 1.5, 0.75  # Of a curve, and of the dark line on either side of it, in pixels at scale 1.
+SOLID = "SOLID", "WIREFRAME"  # Kinds of shading without materials.
 STROKE = 3.0  # The size of a contact of a stroke.
 NEARER = 0.002  # Where curves may be hidden, they are drawn nearer by this share of their distance.
 FONT, LETTER = 0, 12.0  # Blender's own font; the size of the letters of principal directions.
@@ -37,20 +39,21 @@ def draw_curves() -> None:
     """Draws the curves of all visible patches on them; in Solid shading through what is in front of them."""
     context = bpy.context
     space: Any = context.space_data
-    is_solid = space.shading.type in ("SOLID", "WIREFRAME")
     shown = _shown_patches(context)
     if not shown:
         return
-    gpu.state.depth_test_set("NONE" if is_solid else "LESS_EQUAL")
+    gpu.state.depth_test_set("NONE" if space.shading.type in SOLID else "LESS_EQUAL")
     gpu.state.depth_mask_set(False)  # A curve would hide parts of its own outline.
     for obj in shown:
-        pushed = cast(Any, gpu.matrix.push_pop())  # which the stubs make no context
-        lift = Matrix.Translation((0.0, 0.0, 0.0 if is_solid else obj.get(ABOVE, 0.0)))
-        with pushed:
-            gpu.matrix.load_matrix(nearer(context.region_data, NEARER) @ gpu.matrix.get_model_view_matrix())
-            gpu.matrix.multiply_matrix(obj.matrix_world @ lift)
+        with coordinates(drawn_at(space, obj), NEARER):
             draw(obj[CURVES], DARK, obj.tactile_contours, obj.tactile_directions)
     gpu.state.depth_test_set("NONE")
+
+
+def drawn_at(space: Any, patch: Object) -> Matrix:
+    """Where a viewport draws a patch in the world: Material Preview and Rendered raise it by its material."""
+    raised = 0.0 if space.shading.type in SOLID else patch.get(ABOVE, 0.0)
+    return patch.matrix_world @ Matrix.Translation((0.0, 0.0, raised))
 
 
 def _shown_patches(context: bpy.types.Context) -> list[Object]:
@@ -60,11 +63,21 @@ def _shown_patches(context: bpy.types.Context) -> list[Object]:
     return [o for o in objects if CURVES in o and (o.tactile_contours or o.tactile_directions)]
 
 
-def nearer(view: bpy.types.RegionView3D, share: float) -> Matrix:
-    """What moves all by a share of its distance toward the eye, to the same place on the screen."""
+@contextmanager
+def coordinates(matrix: Matrix, share: float = 0.0) -> Iterator[None]:
+    """Within this context, all is drawn in the coordinates that a matrix takes to the world.
+
+    share : it is nearer to the eye by this share of its distance, at the same place on the screen
+    """
+    view: Any = bpy.context.region_data
+    nearer = Matrix.Translation((0.0, 0.0, share * view.view_distance))
     if view.is_perspective:
-        return Matrix.Scale(1.0 - share, 4)
-    return Matrix.Translation((0.0, 0.0, share * view.view_distance))
+        nearer = Matrix.Scale(1.0 - share, 4)
+    pushed = cast(Any, gpu.matrix.push_pop())  # which the stubs make no context
+    with pushed:
+        gpu.matrix.load_matrix(nearer @ gpu.matrix.get_model_view_matrix())
+        gpu.matrix.multiply_matrix(matrix)
+        yield
 
 
 def draw(curves: Curves, rim: tuple[float, ...], has_contours: bool, has_directions: bool) -> None:
@@ -77,21 +90,22 @@ def draw(curves: Curves, rim: tuple[float, ...], has_contours: bool, has_directi
         lines += [(path, (*color, 1.0)) for path, color in pairs]
     if has_directions:
         lines += [(path, BLACK) for path in curves["directions"]]
-    _draw_lines([(np.asarray(path, dtype=float).tobytes(), color) for path, color in lines])
+    draw_lines(lines)
     gpu.state.point_size_set(STROKE * scale)
     for path in curves.get("strokes", ()) if has_contours else ():
         draw_shape("POINTS", "POINT_UNIFORM_COLOR", {"pos": np.reshape(path, (-1, 3)).tolist()}, color=BLACK)
 
 
-def _draw_lines(lines: Sequence[tuple[bytes, tuple[float, ...]]]) -> None:
-    """Draws lines, each of which has float64 numbers, three a point, and a color."""
+def draw_lines(lines: Sequence[tuple[Sequence[float], tuple[float, ...]]]) -> None:
+    """Draws lines, each of which has numbers, three a point, and a color."""
     scale = bpy.context.preferences.system.ui_scale
     shader = _shader()
+    drawn = tuple((np.array(path, dtype=float).tobytes(), color) for path, color in lines)
     gpu.state.blend_set("ALPHA")
     for is_outline, width in ((True, WIDTH + 2.0 * OUTLINE), (False, WIDTH)):
         shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
         shader.uniform_float("lineWidth", width * scale)
-        _batch(tuple(lines), is_outline).draw(shader)
+        _batch(drawn, is_outline).draw(shader)
     gpu.state.blend_set("NONE")
 
 
@@ -138,10 +152,6 @@ def draw_preview(seen: dict[str, Any]) -> None:
     if seen["touched"] is None:
         return
     r: core.Reconstruction = seen["touched"].result
-    frame = np.eye(4)
-    frame[:3, :3], frame[:3, 3] = r.frame.axes, r.frame.origin
-    pushed = cast(Any, gpu.matrix.push_pop())
-    with pushed:
-        gpu.matrix.multiply_matrix(Matrix(frame.tolist()))
+    with coordinates(Matrix(matrix_of(r.frame.axes, r.frame.origin).tolist())):
         draw(curves_of(r), WHITE, has_contours=True, has_directions=False)
-        _draw_lines([(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.6 * r.radius]).tobytes(), WHITE)])
+        draw_lines([([0.0, 0.0, 0.0, 0.0, 0.0, 0.6 * r.radius], WHITE)])

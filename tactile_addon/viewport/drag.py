@@ -12,7 +12,7 @@ from mathutils import Matrix, Vector
 from mathutils.geometry import intersect_line_plane
 
 from ..probes import anchor, probe, touch_again
-from ..scene.curves import CURVES
+from ..scene.patch_record import CURVES
 from ..touch import units
 from ..touch.settings import MOST_PLANES, STEEPEST
 from ..touch.surface import MeshSurface
@@ -76,7 +76,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
         # Blender hears of it late, when the mouse is already elsewhere.
         self._before = self._value = self._free = self._last = self._get(context)
         if self.what == DRAG_EXTENT:
-            self._center, self._last = ring_of(probe.patch_of(found))
+            self._take_rim(context, event)
         below = None if self.what == POINT else self._below(context, event)
         if self.what != POINT and below is None:
             self.report({"WARNING"}, "The plane is seen edge on: turn the view to drag this handle")
@@ -87,6 +87,15 @@ class TACTILE_OT_drag(bpy.types.Operator):
         context.window_manager.modal_handler_add(self)
         self._say(context)
         return {"RUNNING_MODAL"}
+
+    def _take_rim(self, context: bpy.types.Context, event: bpy.types.Event) -> None:
+        """Lets the mouse drag the rim of the patch where that is nearest, in the plane across the normal."""
+        origin, direction = mouse_ray(context.region, context.region_data, event)
+        patch = probe.patch_near(context.object)
+        rim = [patch.matrix_world @ Vector(place) for place in np.reshape(patch[CURVES]["rim"][0], (-1, 3))]
+        nearest = min(rim, key=lambda place: (place - origin).cross(direction).length)
+        self._center = self._center + (nearest - self._center).project(self._matrix.col[2].xyz)
+        self._last = (nearest - self._center).length
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         if event.type in {"ESC", "RIGHTMOUSE"}:
@@ -198,13 +207,6 @@ class TACTILE_OT_drag(bpy.types.Operator):
         found = probe.probe_of(context.object)
         if found.tactile_probe.live:
             touch_again.refresh(found, context)
-
-
-def ring_of(patch: Object) -> tuple[Vector, float]:
-    """Middle and radius of the ring of the extent, which is as high and as far out as curves end."""
-    ends = np.concatenate([np.reshape(path, (-1, 3))[[0, -1]] for path in patch[CURVES]["contours"]])
-    middle = patch.matrix_world @ Vector((0.0, 0.0, float(np.median(ends[:, 2]))))
-    return middle, float(np.median(np.hypot(*ends[:, :2].T)))
 
 
 def shown_probe(context: bpy.types.Context) -> Object | None:

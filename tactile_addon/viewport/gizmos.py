@@ -6,15 +6,16 @@ from collections.abc import Sequence
 from typing import Any
 
 import bpy
+import gpu
 import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Matrix, Vector
 
 from ..probes import probe
-from ..scene.curves import CURVES
+from ..scene.patch_record import CURVES
 from ..touch.touch_object import plane_axes
-from .curves import PLANE_COLORS
-from .drag import DRAG_EXTENT, DRAG_TILT, DRAG_TURN, POINT, STEEP, ring_of, shown_probe
+from .curves import PLANE_COLORS, coordinates, draw_lines, drawn_at
+from .drag import DRAG_EXTENT, DRAG_TILT, DRAG_TURN, POINT, STEEP, shown_probe
 from .free_view import is_free
 from .mouse import line_of_sight
 
@@ -26,6 +27,22 @@ BALL, LEAST_BALL = 0.12, 0.05  # Sizes of balls, in units of Blender's gizmo siz
 SHARE = 0.125  # A ball is no larger than this share of the patch in the view.
 APART = 24.0  # Handles that are nearer to the point in the view than this many pixels at scale 1 are hidden.
 NEAREST = 1e3  # What is closer to the eye than the point by less than this does not win over it.
+
+
+class TACTILE_GT_rim(bpy.types.Gizmo):
+    """The rim of a patch: a circle would be in the air beside a saddle"""
+
+    bl_idname = "TACTILE_GT_rim"
+    rim: Sequence[float] = ()  # Three coordinates a point.
+
+    def draw(self, context: bpy.types.Context) -> None:
+        color: Any = self.color_highlight if self.is_highlight else self.color
+        with coordinates(self.matrix_world):
+            draw_lines([(self.rim, (*color, 1.0))])
+
+    def draw_select(self, context: bpy.types.Context, select_id: int) -> None:  # type: ignore[override]
+        gpu.select.load_id(select_id)
+        self.draw(context)
 
 
 class TACTILE_GGT_handles(bpy.types.GizmoGroup):
@@ -42,9 +59,8 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         return found is not None and found.tactile_probe.show_handles
 
     def setup(self, context: bpy.types.Context) -> None:
-        self.extent = self._handle("GIZMO_GT_dial_3d", DRAG_EXTENT, 0, (1.0, 1.0, 1.0))
+        self.extent = self._handle(TACTILE_GT_rim.bl_idname, DRAG_EXTENT, 0, (1.0, 1.0, 1.0))
         self.extent.use_draw_scale = False
-        self.extent.line_width = 2.0
         self.point = self._ball(POINT, 0, (1.0, 1.0, 1.0))
         self.point.select_bias = NEAREST
         self.turns = [self._ball(DRAG_TURN, i, color) for i, color in enumerate(PLANE_COLORS)]
@@ -93,11 +109,9 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         for each, line in handles:
             self._put(context, each, line, taken)
             each.hide = not _are_apart(context, center, each.matrix_basis.translation)
-        middle, wide = ring_of(patch)
-        self.extent.hide = not _are_apart(context, center, middle + wide * _right(context))
-        self.extent.matrix_basis = Matrix.LocRotScale(
-            middle[:], patch.matrix_world.to_quaternion(), [wide] * 3
-        )
+        self.extent.hide = not _are_apart(context, center, center + reach * _right(context))
+        self.extent.rim = list(patch[CURVES]["rim"][0])  # Another touch frees the patch's own.
+        self.extent.matrix_basis = drawn_at(context.space_data, patch)
 
     def _put(self, context: bpy.types.Context, handle: Any, line: list[Any], taken: list[Any]) -> None:
         """Puts a handle on a line, as far out as the view is free, or if it is nowhere, on its end.

@@ -14,6 +14,7 @@ from ..probes.operators import (
     make_active,
     report_done,
     report_error,
+    reports_errors,
     target_object,
 )
 from ..scene import patch_record
@@ -130,18 +131,16 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         self._area.header_text_set(None)
         _redraw(context)
 
+    @reports_errors
     def execute(self, context: bpy.types.Context) -> Outcome:
-        try:
-            self._inherit(context)
-            touched = touch(
-                target_object(context, self.target),
-                context.evaluated_depsgraph_get(),
-                given(self, "location") or context.scene.cursor.location.to_tuple(),
-                toward=given(self, "outward"),
-                **touch_arguments(self),
-            )
-        except ValueError as error:
-            return report_error(self, error)
+        self._inherit(context)
+        touched = touch(
+            target_object(context, self.target),
+            context.evaluated_depsgraph_get(),
+            given(self, "location") or context.scene.cursor.location.to_tuple(),
+            toward=given(self, "outward"),
+            **touch_arguments(self),
+        )
         return self._make(context, touched)
 
     def _make(self, context: bpy.types.Context, touched: Touched) -> Outcome:

@@ -38,6 +38,7 @@ class ObjectTouches:
     rims : how far the finger feels each of their patches all round, (AZIMUTHS,), lengths
     done : the number of touches so far, including those that gave no patch
     words, share : what is going on, and the share of all that is done
+    is_stopped : if it is set, the steps touch no more, and join the patches so far
     whole, compared : the WholeSurface, and its BothWays from the mesh, once the steps are done
     """
 
@@ -228,10 +229,6 @@ class ObjectTouches:
         again._require_lengths(self.noise, self.edge)
         again._begin(self.explored)
         return again
-
-    def stop(self) -> None:
-        """Makes the steps touch no more, and join the patches so far."""
-        self.is_stopped = True
 
     def report(self) -> dict[str, Any]:
         """What was found, as a dict of plain values."""

@@ -51,10 +51,10 @@ def test_lengths_and_angles_know_their_units(empty):
 def test_no_dialog_has_more_than_five_fields(extension):
     addon = extension.tactile_addon
     operators = (
-        addon.whole_object.object_operator.TACTILE_OT_touch_all_over,
-        addon.whole_object.surface_operators.TACTILE_OT_mesh_again,
-        addon.whole_object.surface_operators.TACTILE_OT_continue_touching,
-        addon.stability_map.map_operator.TACTILE_OT_stability_map,
+        addon.whole_object.object_operators.TACTILE_OT_touch_all_over,
+        addon.whole_object.object_operators.TACTILE_OT_mesh_again,
+        addon.whole_object.object_operators.TACTILE_OT_continue_touching,
+        addon.stability_map.map_object.TACTILE_OT_stability_map,
     )
     assert max(len(operator.shown) for operator in operators) <= 5
 

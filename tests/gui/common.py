@@ -6,7 +6,6 @@ import math
 import os
 import subprocess
 from pathlib import Path
-from statistics import median
 
 import bpy
 import gui
@@ -143,14 +142,14 @@ def handle(azimuth, reach=1.0):
 
 
 def on_ring(azimuth, share=1.0):
-    """Where in the window the ring of the extent is at that azimuth, or else nearer to its middle."""
+    """Where in the window the ring of the extent, the rim, is at that azimuth, or nearer to its middle."""
     shown, e1, e2 = patch(), probe().matrix_world.col[0].xyz, probe().matrix_world.col[1].xyz
-    ends = [
-        Vector(path[i : i + 3]) for path in shown["tactile_curves"]["contours"] for i in (0, len(path) - 3)
-    ]
-    wide, high = median(end.xy.length for end in ends), median(end.z for end in ends)
-    at = share * wide * (math.cos(azimuth) * e1 + math.sin(azimuth) * e2)
-    return gui.view_point(shown.matrix_world @ Vector((0.0, 0.0, high)) + at)
+    numbers, origin, normal = shown["tactile_curves"]["rim"][0], shown.matrix_world.translation, e1.cross(e2)
+    rim = [shown.matrix_world @ Vector(numbers[i : i + 3]) - origin for i in range(0, len(numbers), 3)]
+    way = math.cos(azimuth) * e1 + math.sin(azimuth) * e2
+    at = max(rim, key=lambda place: way.dot(place) / place.length)
+    high = at.dot(normal) / normal.length_squared * normal
+    return gui.view_point(origin + high + share * (at - high))
 
 
 def consistent(when, owner=None):

@@ -116,7 +116,7 @@ def test_the_patch_of_a_probe_is_where_its_probe_is(empty, suzanne, extension):
         empty.ops.tactile.register(target=suzanne.name)
     patch = extension.tactile_addon.probes.probe.patch_near(empty.context.object)
     registration, report = (
-        extension.tactile_addon.comparison.register_operator,
+        extension.tactile_addon.comparison.operators,
         extension.tactile_addon.touch.wording,
     )
     found = {"target": "A", "pose": 1, "residuals": [0.1, 0.2], "is_ambiguous": False}
@@ -172,7 +172,7 @@ def test_a_mesh_that_is_nowhere_is_named(empty, suzanne, tmp_path, name):
 def test_a_search_that_is_stopped_leaves_the_patch_and_one_that_fails_says_why(
     empty, suzanne, extension, monkeypatch
 ):
-    registration = extension.tactile_addon.comparison.register_operator
+    registration = extension.tactile_addon.comparison.operators
     patch = touched(empty, suzanne, forehead(suzanne, empty))
     lost(empty, patch)
     before, depsgraph = patch.matrix_world.copy(), empty.context.evaluated_depsgraph_get()

@@ -161,12 +161,12 @@ def test_the_scenes_unit_is_the_panels(empty, patch, extension):
     settings.system, settings.scale_length, settings.length_unit = "METRIC", 0.001, "MILLIMETERS"
     found = verified(empty, patch)
     unit = addon.touch.units.unit_of(empty.context.scene, patch["tactile"]["radius"])
-    head, *rows, points = addon.comparison.verify_operator.verification_table(patch["tactile"])
+    head, *rows, points = addon.comparison.operators.verification_table(patch["tactile"])
     assert head == ("in mm", "Mesh", "Contacts")
     assert [row[0] for row in rows] == ["Mean", "Median", "Maximum", "RMS"]
     assert rows[0][1] == f"{found['vertex_distance_mean']:.3g}"
     assert points == ("Points", str(found["vertices"]), "60")
-    rows = dict(addon.comparison.verify_operator.verification_rows(patch["tactile"]))
+    rows = dict(addon.comparison.operators.verification_rows(patch["tactile"]))
     assert rows["Overlap"] == "100 %"
     farthest = np.abs(values(patch.data, "deviation")).max()
     assert rows["Largest Deviation"] == addon.touch.units.say(farthest, 1, unit)
@@ -417,7 +417,7 @@ def test_from_the_shell(empty, command, tmp_path):
 
 @pytest.mark.parametrize("disturb", ["move", "delete", "patch"])
 def test_what_changes_while_it_is_compared_ends_it_with_a_sentence(empty, patch, extension, disturb):
-    operator = extension.tactile_addon.comparison.verify_operator
+    operator = extension.tactile_addon.comparison.operators
     ball = empty.data.objects["Sphere"]
     verification = operator.Verification(patch, ball)
     verification.look(empty.context.evaluated_depsgraph_get())
@@ -435,7 +435,7 @@ def test_what_changes_while_it_is_compared_ends_it_with_a_sentence(empty, patch,
 
 def test_in_steps_it_finds_what_it_finds_at_once(empty, patch, extension):
     """The result is the same even where Blender evaluates the mesh again between two steps."""
-    operator = extension.tactile_addon.comparison.verify_operator
+    operator = extension.tactile_addon.comparison.operators
     ball, wanted, done = empty.data.objects["Sphere"], verified(empty, patch), []
     deviation = values(patch.data, "deviation")
     verification = operator.Verification(patch, ball)

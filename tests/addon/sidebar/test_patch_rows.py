@@ -20,11 +20,6 @@ def millimeters(empty):
 
 
 @pytest.fixture
-def said(extension, millimeters):
-    return extension.tactile_addon.sidebar.patch_rows
-
-
-@pytest.fixture
 def wording(extension, millimeters):
     return extension.tactile_addon.touch.wording
 
@@ -63,6 +58,7 @@ def test_a_number_has_no_digit_beyond_the_first_one_of_its_deviation(extension, 
     assert units.say(437.2, 1, UNIT, 12.0) == "440 ± 10 mm"
     assert units.say(0.123456, 1, UNIT, 1e-9) == "0.123 ± 1e-09 mm"
     assert units.say(0.125, 1, UNIT, 0.0) == "0.125 ± 0 mm"
+    assert units.say(-2.03e-3, -1, UNIT, 4e-5) == "-0.00203 ± 0.00004 1/mm"
     assert units.say(3.34e-7, -1, UNIT, 7e-4) == "0 ± 0.0007 1/mm"
     assert units.say(-0.002, -1, UNIT, 7e-4) == "-0.002 ± 0.0007 1/mm"
     flat = {"k1": 2e-40, "k2": -1e-7, "k1_std": 0.01, "k2_std": 0.01, "radius": 1.0}
@@ -87,11 +83,11 @@ def test_a_good_verdict_says_where_curvatures_are_uncertain(wording, more, is_un
     assert said == ("Good heights, to ± 0.0123 mm; curvatures are uncertain" if is_uncertain else good)
 
 
-def test_a_flat_patch_has_no_shape_index(said, empty):
+def test_a_flat_patch_has_no_shape_index(wording, empty):
     empty.ops.mesh.primitive_cube_add()
     empty.ops.tactile.pick(target="Cube", location=(0.2, 0.1, 1.0))
     (patch,) = empty.context.object.children
-    assert dict(said.other_rows(patch["tactile"].to_dict()))["Shape Index"] == "–"
+    assert dict(wording.other_rows(patch["tactile"].to_dict()))["Shape Index"] == "–"
 
 
 def test_the_verdict_says_good_and_how_good(wording):
@@ -112,11 +108,11 @@ def test_the_reasons_say_what_limits_a_good_patch(wording, empty):
     assert reason.endswith(" 3 of 6 half curves ended at a crease, before the extent.")
 
 
-def test_the_deviation_at_the_rim_stands_below_the_mean(said, ball):
-    rows = dict(said.other_rows(ball[1]))
+def test_the_deviation_at_the_rim_stands_below_the_mean(wording, ball):
+    rows = dict(wording.other_rows(ball[1]))
     mean, rim = (float(rows[key].split()[1]) for key in ("Height", "At the Rim"))
     assert 1.5 < rim / mean < 10.0
-    assert dict(said.other_rows({**ball[1], "height_std_rim": 0.04}))["At the Rim"] == "± 0.04 mm"
+    assert dict(wording.other_rows({**ball[1], "height_std_rim": 0.04}))["At the Rim"] == "± 0.04 mm"
 
 
 @pytest.mark.parametrize("status", ["uncertain", "not_converged"])
@@ -136,28 +132,28 @@ def test_the_verdict_on_an_earlier_patch_is_none(wording):
     assert wording.verdict(record("outdated")) == "Outdated: touch again"
 
 
-def test_what_was_found_stands_next_to_auto(said, ball):
+def test_what_was_found_stands_next_to_auto(wording, ball):
     _, report = ball
-    found = said.found_values(report)
+    found = wording.found_values(report)
     assert found.keys() == {"extent", "step", "degree"}
     number, unit = found["extent"].split()
     meters = {"mm": 1.0}[unit]
     assert float(number) * meters == pytest.approx(report["extent"], rel=1e-2)
-    assert said.found_values(None) == said.found_values(report | {"status": "outdated"}) == {}
+    assert wording.found_values(None) == wording.found_values(report | {"status": "outdated"}) == {}
 
 
-def test_rows_are_distinguished_by_how_they_begin(said, ball):
+def test_rows_are_distinguished_by_how_they_begin(wording, ball):
     _, report = ball
-    rows = said.main_rows(report) + said.other_rows(report)
+    rows = wording.main_rows(report) + wording.other_rows(report)
     labels = [label for label, value in rows if value]  # a heading has no value
     assert len({label[:5] for label in labels}) == len(labels) == len(set(labels))
     assert max(map(len, labels)) <= 11
 
 
-def test_every_row_says_what_it_is(said, extension, ball):
+def test_every_row_says_what_it_is(wording, extension, ball):
     _, report = ball
     addon = extension.tactile_addon
-    rows = said.main_rows(report) + said.other_rows(report) + said.plane_rows(report)
+    rows = wording.main_rows(report) + wording.other_rows(report) + wording.plane_rows(report)
     labels = [label for label, value in rows if value] + [
         "Error on 9 More Curves",
         "Total Curvature",
@@ -275,6 +271,14 @@ def test_the_button_that_helps_is_below_the_curvatures(extension, empty):
     assert names.index("κ2") < names.index("tactile.add_subdivision")
 
 
+def test_the_advice_alone_says_whether_the_button_helps(extension, empty, ball):
+    obj, record = empty.context.object, empty.context.object.children[0]["tactile"]
+    for advice, helps in (("use a shorter extent", False), (extension.core.SUBDIVIDE, True)):
+        record["doubts"] = [{"code": "folds", "sentence": "The surface turns", "advice": advice}]
+        names = [text for text, _ in drawn_of(empty, extension, obj)]
+        assert ("tactile.add_subdivision" in names) is helps
+
+
 def drawn_of(bpy, extension, obj):
     """What the panel of the result draws of an object: (text, whether it is not gray)."""
     context = SimpleNamespace(
@@ -324,7 +328,7 @@ def test_a_single_thing_is_not_said_in_the_plural(extension, empty):
     found = {"target": "Cube", "vertices": 1, "overlap": 1.0, "extra_points": 9}
     found |= {"vertex_distance_mean": 0.5, "vertex_distance_max": 0.5}
     report = {"status": "ok", "radius": 1.0, "verification": found}
-    wording = addon.comparison.verify_operator
+    wording = addon.comparison.operators
     words = wording.verification_summary(report)[1]
     assert words.startswith('At 1 vertex, "Cube" is 0.5 m off the patch on average')
     found["vertices"] = 2

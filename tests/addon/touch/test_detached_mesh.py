@@ -74,14 +74,14 @@ def test_another_shape_is_noticed_soon_and_for_sure_in_the_end(empty, ball, take
 
 def test_the_shape_is_compared_for_a_fiftieth_of_the_time(empty, ball, taken, extension, monkeypatch):
     module, now, compared = extension.tactile_addon.touch.detached_mesh, [0.0], []
-    inner = module.coordinates
+    inner = module.checksum_of
 
-    def coordinates(*arguments):
+    def checksum_of(*arguments):
         compared.append(now[0])
         now[0] += 1.0
         return inner(*arguments)
 
-    monkeypatch.setattr(module, "coordinates", coordinates)
+    monkeypatch.setattr(module, "checksum_of", checksum_of)
     monkeypatch.setattr(module, "perf_counter", lambda: now[0])
     while now[0] < 102.0:
         assert taken.require_source(empty.context) == ball

@@ -167,7 +167,7 @@ def test_a_crease_of_a_fine_mesh_is_none_between_facets(empty, cube):
 
 
 def test_what_rounding_leaves_of_nothing_is_said_to_be_none(extension, empty):
-    settings, said = empty.context.scene.unit_settings, extension.tactile_addon.sidebar.patch_rows
+    settings, said = empty.context.scene.unit_settings, extension.tactile_addon.touch.wording
     settings.scale_length, settings.length_unit = 0.001, "MILLIMETERS"
     rows = dict(said.main_rows(RECORD) + said.other_rows(RECORD))
     assert rows["κ1"] == "0 ± 0.01 1/mm"
@@ -200,7 +200,7 @@ def test_the_preview_promises_no_more_than_was_felt(empty, extension, cube):
     touched = addon.touch.touch_object.touch(cube, depsgraph, (0.9, 0.2, 1.0), planes, **inputs)
     curves = {
         name: [touched.result.frame.to_world(np.reshape(path, (-1, 3))) for path in paths]
-        for name, paths in addon.scene.curves.curves_of(touched.result).items()
+        for name, paths in addon.scene.patch_record.curves_of(touched.result).items()
     }
     (rim,), lines = curves["rim"], curves["contours"]
     assert len(lines) == 3

@@ -183,7 +183,7 @@ def test_quick_and_fine_have_other_tolerances(empty, ball):
 
 def dialog_of(extension):
     """The dialog of Touch All Over without a window; its `words` say what an object takes."""
-    operator = extension.tactile_addon.whole_object.object_operator.TACTILE_OT_touch_all_over
+    operator = extension.tactile_addon.whole_object.object_operators.TACTILE_OT_touch_all_over
 
     class Dialog:
         _shape, accuracy, noise = None, "normal", 0.0
@@ -228,7 +228,7 @@ def test_a_dialog_can_tell_that_walls_are_thin(extension, empty):
 
 def test_the_mesh_of_thin_walls_is_fine(extension):
     """Each halving of a wall halves edges, until the grid is as fine as it may be."""
-    fineness = extension.tactile_addon.whole_object.object_operator.fineness
+    fineness = extension.tactile_addon.whole_object.object_operators.fineness
     assert fineness(np.inf) == fineness(1.0) == fineness(1.0 / 16.0) == 1.0
     assert fineness(1.0 / 32.0) == pytest.approx(4.0)
     assert fineness(1.0 / 64.0) == pytest.approx(16.0)

@@ -328,7 +328,7 @@ def test_once_stopped_it_touches_no_more(balls, touches_of, word):
     done = None
     for _ in touches.steps():
         if done is None and touches.words.startswith(word):
-            touches.stop()
+            touches.is_stopped = True
             done = touches.done
     assert done is not None
     assert touches.done == done
@@ -343,7 +343,7 @@ def test_once_stopped_it_says_that_it_joins(ball, touches_of):
             words.append(touches.words)
         waited += touches.done == 1
         if waited == 3:  # The second touch is under way.
-            touches.stop()
+            touches.is_stopped = True
     assert words[0].startswith("Joining ")
     assert not any(each[0].isdigit() for each in words)
 
@@ -352,7 +352,7 @@ def test_who_stops_it_gets_no_advice_to_allow_more_touches(ball, touches_of):
     touches = touches_of(ball, tolerance=0.02)
     for _ in touches.steps():
         if touches.done >= 3:
-            touches.stop()
+            touches.is_stopped = True
     report = touches.report()
     assert re.fullmatch(
         r"Touching ended when [\d.]+ % of the object was felt, and the rest is up to [\d.]+ m away: continue "

@@ -1,13 +1,17 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operator that compares a patch, where it is now, with any mesh, and the work behind it."""
+"""Operators that compare a patch with a mesh where it is, or put it onto one, and the work behind them."""
 
+import threading
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent import futures
+from time import perf_counter
 from typing import Any
 
 import bpy
 import numpy as np
-from bpy.props import StringProperty
+from bpy.props import IntProperty, StringProperty
+from mathutils import Matrix
 
 from ... import core
 from ...core.arguments import many
@@ -17,15 +21,18 @@ from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, report_done, target_object
 from ..scene import mesh_data, patch_record, shown
 from ..touch import units
+from ..touch.detached_mesh import DetachedMesh
 from ..touch.surface import MeshSurface
 from ..touch.touch_report import TouchReport, judgment
 from ..touch.types import Object, Outcome
-from ..touch.wording import SPREAD, cell
+from ..touch.wording import SPREAD, cell, registration_summary
 
 VERTICES_AT_ONCE = 2000  # A step looks at this many vertices,
 VERIFYING = 0.8  # which takes this share of the time.
 VERTICES = "vertices", "vertex_distance_mean", "vertex_distance_max"  # What the report has of them, too.
 
+POSES = 5  # The most places that a search for a patch gives.
+HURRY = 0.02  # The seconds after which it is checked again whether the search is done.
 # The results of core.verify, and the largest distance of the patch from the mesh, in the order of a table.
 VERIFIED = (
     *("vertices", *(f"vertex_distance_{key}" for key in SPREAD)),
@@ -267,3 +274,89 @@ class TACTILE_OT_verify(WithMesh, bpy.types.Operator):
         probe.patch_near(context.view_layer.objects.active).tactile_colors = "deviation"
         doubt, summary = verification_summary(record)
         return report_done(self, summary, not doubt)
+
+
+class Search:
+    """The search for the place of a patch on a mesh object, in another thread, which does not use Blender.
+
+    began : when it began, in seconds
+    """
+
+    def __init__(self, patch: Object, target: Object, depsgraph: bpy.types.Depsgraph) -> None:
+        if probe.probe_of(patch) is not None:
+            raise ValueError(f'The place of "{patch.name}" is that of its probe, so it is known already')
+        mesh = DetachedMesh(target, depsgraph)
+        given = patch_record.reconstruction_of(patch), mesh.points + mesh.origin, mesh.triangles
+        self.patch, self.target, self._matrix = patch.name, target.name, patch.matrix_world.copy()
+        self._found: futures.Future[list[core.Pose]] = futures.Future()
+        self.began = perf_counter()
+        threading.Thread(target=self._run, args=given, daemon=True).start()
+
+    def _run(self, *given: Any) -> None:
+        try:
+            self._found.set_result(core.register(*given, best=POSES))
+        except MemoryError:
+            words = f'"{self.target}" is too large to be searched: remove what is far from the patch'
+            self._found.set_exception(ValueError(words))
+        except Exception as error:
+            self._found.set_exception(error)
+
+    def steps(self) -> Iterator[None]:
+        """Waits to the end, as a generator between whose steps a window may draw."""
+        while not futures.wait([self._found], HURRY).done:
+            yield
+
+    def put(self, pose: int = 1) -> dict[str, Any]:
+        """Moves the patch to one of the poses, from 1 on, and returns its record with `registration`.
+
+        It waits for the search. Raises ValueError, with a sentence, if that has not found the pose.
+        """
+        poses = self._found.result()
+        if pose > len(poses):
+            count = many(len(poses), "pose", "poses")
+            raise ValueError(f'The search has found {count} on "{self.target}": choose a lower number')
+        patch: Object = bpy.data.objects.get(self.patch)
+        if patch is None:
+            raise ValueError(f'"{self.patch}" was deleted while its place was searched for')
+        motion = patch_record.matrix_of(poses[pose - 1].rotation, poses[pose - 1].translation)
+        patch.matrix_world = Matrix(motion.tolist()) @ self._matrix
+        patch[patch_record.RECORD]["registration"] = {
+            "target": self.target,
+            "pose": pose,
+            "residuals": [found.residual for found in poses],
+            "vertices": [found.vertex for found in poses],
+            "is_ambiguous": poses[0].is_ambiguous,
+        }
+        return patch[patch_record.RECORD].to_dict()
+
+
+class TACTILE_OT_register(WithMesh, bpy.types.Operator):
+    """Find where on a mesh the active patch belongs, by its contacts alone, and move it there"""
+
+    bl_idname = "tactile.register"
+    bl_label = "Register onto Mesh"
+    bl_options = {"REGISTER", "UNDO"}
+
+    pose: IntProperty(
+        name="Pose",
+        description="Which of the places that were found: 1 is the best, others may be about as good",
+        default=1,
+        min=1,
+        max=POSES,
+    )
+
+    shown = ("target", "pose")
+    hint = "Select a mesh and then the patch to put onto it"
+
+    def _begin(self, context: bpy.types.Context) -> None:
+        patch = probe.patch_near(context.view_layer.objects.active)
+        self._search = Search(patch, self._mesh(context, patch), context.evaluated_depsgraph_get())
+        self._steps = self._search.steps()
+
+    def _done(self) -> Progress:
+        seconds = perf_counter() - self._search.began
+        return f'Looking for the patch on "{self._search.target}": {seconds:.0f} s', None
+
+    def _finish(self, context: bpy.types.Context) -> Outcome:
+        record = self._search.put(self.pose)
+        return report_done(self, registration_summary(record), not record["registration"]["is_ambiguous"])
