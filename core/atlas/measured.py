@@ -23,7 +23,7 @@ from ..triangles import row_dot
 from ..verdict import Doubt, beyond
 from .charts import AZIMUTHS, Charts
 from .connectivity import Indices, connected_pieces
-from .field import AGREE, covered
+from .field import AGREE, INSIDE, sheet_facing
 from .finger import FACING
 from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
@@ -117,10 +117,11 @@ def _judged(
     contacts, mesh, most = cloud.contacts, atlas.reference.mesh, atlas.tolerance or GROWN * radius
     off_surface = partial(_off_surface, atlas, noise, most)
     distances, far, is_turned = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
-    off_planes = partial(_off_planes, atlas.charts, cloud)
+    limit = MOST_OFF * float(np.ptp(contacts.points, axis=0).max())
+    off_planes = partial(_off_planes, atlas.charts, cloud, limit)
     between, alike = yield from chunked(off_planes, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
     worst, widest = _largest_cluster(far, distances, contacts.links), np.argsort(-between, kind="stable")
-    limit, fit_noise = MOST_OFF * float(np.ptp(contacts.points, axis=0).max()), 0.0 if cloud.noise else noise
+    fit_noise = 0.0 if cloud.noise else noise
     off = _doubts_of_contacts(contacts, distances, far, worst, is_turned, limit)
     gaps = widest[:0] if atlas.uncovered else widest[between[widest] > limit]
     sparse = [Doubt("sparse", between[i], limit, (place_text(mesh.vertices[[i]]),)) for i in gaps[:1]]
@@ -261,18 +262,25 @@ def _off_surface(
     return np.abs(distances), far | is_turned, is_turned
 
 
-def _off_planes(charts: Charts, cloud: "_Cloud", points: Array, normals: Array) -> tuple[Array, Indices]:
+def _off_planes(
+    charts: Charts, cloud: "_Cloud", most: float, points: Array, normals: Array
+) -> tuple[Array, Indices]:
     """How far places (n, 3) of the surface are off the planes of nearest contacts, and which these are, (n,).
 
-    Of contacts nearby it is one that faces alike, if there is any. It is 0 on patches. Between them the
-    surface may be anywhere up to these planes: an edge that no contact is near is cut off by half of the
-    distance of contacts.
+    The surface between contacts may be anywhere up to the plane of the nearest one that faces alike, if any
+    does: an edge that no contact is near is cut off by half of the distance of contacts. Where that and the
+    nearest of all are of two walls, it is the distance from what both enclose, so that the foot of an edge
+    that is cut off is on its wall, and a fin along the plane of one wall is off the other.
+
+    most : up to this length off patches the surface is on them, where it is 0
     """
-    near, contacts = cloud.tree.query(points, ABREAST)[1], cloud.contacts
+    near, contacts, every = cloud.tree.query(points, ABREAST)[1], cloud.contacts, np.arange(len(points))
     is_alike = np.einsum("nki,ni->nk", contacts.normals[near], normals) > AGREE
-    nearest = near[np.arange(len(points)), is_alike.argmax(axis=1)]
-    off = np.abs(row_dot(contacts.normals[nearest], points - contacts.points[nearest]))
-    return np.where(covered(charts, points, normals), 0.0, off), nearest
+    one, other = near[:, 0], near[every, is_alike.argmax(axis=1)]
+    above, other_above = (row_dot(contacts.normals[k], points - contacts.points[k]) for k in (one, other))
+    is_convex = row_dot(contacts.normals[other], contacts.points[one] - contacts.points[other]) <= 0.0
+    off = np.where(is_convex, np.maximum(above, other_above), np.minimum(above, other_above))
+    return np.where(sheet_facing(charts, points, normals, most).rho < INSIDE, 0.0, np.abs(off)), other
 
 
 def _doubts_of_surface(atlas: Atlas, noise: float, most: float) -> Iterator[Doubt]:
