@@ -45,6 +45,7 @@ AT_EDGE = 0.45  # contacts has a spike of a twentieth of its size.
 RAY_PLACES, RAY_ROUNDS = 16, 2  # Where a patch ends is looked for at so many places on each ray, so often.
 ABREAST = 8  # Of this many neighbors the normals are to face the same way, or one is taken that does.
 SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
+OVER = 0.5
 OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
 # A ball is too large if neighbors below its centers lie the other way by more than this share of their
 # distance, for more than this share of links, at more than this share of centers; edges have up to a ninth.
@@ -265,22 +266,29 @@ def _off_surface(
 def _off_planes(
     charts: Charts, cloud: "_Cloud", most: float, points: Array, normals: Array
 ) -> tuple[Array, Indices]:
-    """How far places (n, 3) of the surface are off the planes of nearest contacts, and which these are, (n,).
+    """How far places (n, 3) of the surface are off what nearest contacts enclose, and the nearest, (n,).
 
-    The surface between contacts may be anywhere up to the plane of the nearest one that faces alike, if any
-    does: an edge that no contact is near is cut off by half of the distance of contacts. Where that and the
-    nearest of all are of two walls, it is the distance from what both enclose, so that the foot of an edge
-    that is cut off is on its wall, and a fin along the plane of one wall is off the other.
+    Between contacts the surface may be anywhere up to the plane of the nearest: an edge that no contact is
+    near is cut off by half of their distance. It is behind the planes of others if these are beyond a convex
+    edge, as a fin along a wall is not, and in front of one of them if they are beyond a concave one.
 
-    most : up to this length off patches the surface is on them, where it is 0
+    most : up to this length off a patch a place is on it, and the planes of contacts that face as it does
+        are as far off as it is curved
     """
-    near, contacts, every = cloud.tree.query(points, ABREAST)[1], cloud.contacts, np.arange(len(points))
-    is_alike = np.einsum("nki,ni->nk", contacts.normals[near], normals) > AGREE
-    one, other = near[:, 0], near[every, is_alike.argmax(axis=1)]
-    above, other_above = (row_dot(contacts.normals[k], points - contacts.points[k]) for k in (one, other))
-    is_convex = row_dot(contacts.normals[other], contacts.points[one] - contacts.points[other]) <= 0.0
-    off = np.where(is_convex, np.maximum(above, other_above), np.minimum(above, other_above))
-    return np.where(sheet_facing(charts, points, normals, most).rho < INSIDE, 0.0, np.abs(off)), other
+    near, contacts = cloud.tree.query(points, ABREAST)[1], cloud.contacts
+    ways, sheet = points[:, None] - contacts.points[near], sheet_facing(charts, points, normals, most)
+    ups = contacts.normals[near]
+    above, lengths = row_dot(ups, ways), np.linalg.norm(ways, axis=2)
+    is_alike = np.einsum("nki,ni->nk", ups, sheet.normal) > AGREE
+    above = np.where(is_alike & (sheet.rho < INSIDE)[:, None], 0.0, above)
+    # The plane of one that is aside may not reach the place, so it is off by no more than the nearest.
+    most_aside, is_aside = np.abs(above[:, :1]), np.abs(above) < OVER * lengths
+    above = np.where(is_aside, np.clip(above, -most_aside, most_aside), above)
+    is_convex = row_dot(ups, contacts.points[near[:, :1]] - contacts.points[near]) <= 0.0
+    is_concave = ~is_convex & (row_dot(ups, ups[:, :1]) < AGREE)
+    front = np.where(is_convex, above, -np.inf).max(axis=1)
+    back = np.where(is_concave, above, np.inf).min(axis=1)
+    return np.abs(np.minimum(front, back)), near[:, 0]
 
 
 def _doubts_of_surface(atlas: Atlas, noise: float, most: float) -> Iterator[Doubt]:
@@ -384,24 +392,27 @@ class _Cloud(NamedTuple):
         from scipy.spatial import cKDTree
 
         points, own, every = self.contacts.points, self.same_sheet(i, 2.0 * r.radius), np.arange(AZIMUTHS)
-        own_tree, turns = cKDTree(points[own]), 2.0 * np.pi * every / AZIMUTHS
-        domain = r.domain.radii(AZIMUTHS) / r.radius
+        # Contact i stands for those of other walls where there are none.
+        others = np.append(np.setdiff1d(self.tree.query_ball_point(points[i], 2.0 * r.radius), own), i)
+        own_tree, other_tree = cKDTree(points[own]), cKDTree(points[others])
+        domain, turns = r.domain.radii(AZIMUTHS) / r.radius, 2.0 * np.pi * every / AZIMUTHS
         low, high = np.zeros(AZIMUTHS), domain + BETWEEN * self.contacts.reach[i] / r.radius
         for _ in range(RAY_ROUNDS):
             rays = np.linspace(low, high, RAY_PLACES + 1)[1:]
             x, y = r.radius * (rays * np.stack([np.cos(turns), np.sin(turns)])[:, None]).reshape(2, -1)
             places = r.frame.to_world(np.stack([x, y, r.height(x, y)], axis=1))
-            away, mine = own_tree.query(places)
-            (to_any, nearest), mine = self.tree.query(places), own[mine]
-            normals = self.contacts.normals[nearest]
-            above, own_above = (row_dot(normals, some - points[nearest]) for some in (places, points[mine]))
+            (away, mine), (to_other, other) = own_tree.query(places), other_tree.query(places)
+            mine, other = own[mine], others[other]
+            normals = self.contacts.normals[other]
+            above, own_above = (row_dot(normals, some - points[other]) for some in (places, points[mine]))
             is_other = np.abs(row_dot(normals, self.contacts.normals[mine])) < AGREE
-            is_beyond = (is_other & (above * own_above < 0.5 * above**2)).reshape(rays.shape)
+            is_beyond = (is_other & (above * own_above < 0.0)).reshape(rays.shape)
             is_end = is_beyond | (away > BETWEEN * self.contacts.reach[mine]).reshape(rays.shape)
             is_end[-1] = True
             end = is_end.argmax(axis=0)
             low, high = np.vstack([low, rays])[end, every], rays[end, every]
-        is_edge = is_beyond & (to_any < AT_EDGE * self.contacts.reach[nearest]).reshape(rays.shape)
+        is_near = (away < AT_EDGE * self.contacts.reach[mine]) | (to_other < AT_EDGE * self.contacts.reach[other])
+        is_edge = is_beyond & is_near.reshape(rays.shape)
         return np.where(is_edge[end, every], low, np.minimum(low, domain))
 
     def longest_sure(self, i: int, radii: list[float], last: int) -> tuple[Reconstruction | None, int]:
