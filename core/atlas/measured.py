@@ -276,15 +276,16 @@ def _off_planes(
         are as far off as it is curved
     """
     near, contacts = cloud.tree.query(points, ABREAST)[1], cloud.contacts
-    ways, sheet = points[:, None] - contacts.points[near], sheet_facing(charts, points, normals, most)
-    ups = contacts.normals[near]
-    above, lengths = row_dot(ups, ways), np.linalg.norm(ways, axis=2)
+    first = (np.einsum("nki,ni->nk", contacts.normals[near], normals) > AGREE).argmax(axis=1)
+    near[np.arange(len(near)), first], near[:, 0] = near[:, 0].copy(), near[np.arange(len(near)), first]
+    ways, ups = points[:, None] - contacts.points[near], contacts.normals[near]
+    above, sheet = row_dot(ups, ways), sheet_facing(charts, points, normals, most)
     is_alike = np.einsum("nki,ni->nk", ups, sheet.normal) > AGREE
     above = np.where(is_alike & (sheet.rho < INSIDE)[:, None], 0.0, above)
-    # The plane of one that is aside may not reach the place, so it is off by no more than the nearest.
-    most_aside, is_aside = np.abs(above[:, :1]), np.abs(above) < OVER * lengths
-    above = np.where(is_aside, np.clip(above, -most_aside, most_aside), above)
-    is_convex = row_dot(ups, contacts.points[near[:, :1]] - contacts.points[near]) <= 0.0
+    # The plane of one that is aside may not reach the place, so it is off by no more than the first.
+    least, is_aside = np.abs(above[:, :1]), np.abs(above) < OVER * np.linalg.norm(ways, axis=2)
+    above = np.where(is_aside, np.clip(above, -least, least), above)
+    is_convex = row_dot(ups - ups[:, :1], ways[:, :1] - ways) >= 0.0
     is_concave = ~is_convex & (row_dot(ups, ups[:, :1]) < AGREE)
     front = np.where(is_convex, above, -np.inf).max(axis=1)
     back = np.where(is_concave, above, np.inf).min(axis=1)
@@ -394,7 +395,7 @@ class _Cloud(NamedTuple):
         points, own, every = self.contacts.points, self.same_sheet(i, 2.0 * r.radius), np.arange(AZIMUTHS)
         # Contact i stands for those of other walls where there are none.
         others = np.append(np.setdiff1d(self.tree.query_ball_point(points[i], 2.0 * r.radius), own), i)
-        own_tree, other_tree = cKDTree(points[own]), cKDTree(points[others])
+        own_tree, other_tree = (cKDTree(points[some]) for some in (own, others))
         domain, turns = r.domain.radii(AZIMUTHS) / r.radius, 2.0 * np.pi * every / AZIMUTHS
         low, high = np.zeros(AZIMUTHS), domain + BETWEEN * self.contacts.reach[i] / r.radius
         for _ in range(RAY_ROUNDS):
