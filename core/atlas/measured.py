@@ -285,9 +285,11 @@ def _off_planes(
     # The plane of one that is aside may not reach the place, so it is off by no more than the first.
     least, is_aside = np.abs(above[:, :1]), np.abs(above) < OVER * np.linalg.norm(ways, axis=2)
     above = np.where(is_aside, np.clip(above, -least, least), above)
-    is_convex = row_dot(ups - ups[:, :1], ways[:, :1] - ways) >= 0.0
-    is_concave = ~is_convex & (row_dot(ups, ups[:, :1]) < AGREE)
-    front = np.where(is_convex, above, -np.inf).max(axis=1)
+    # Two walls meet convexly if contacts of both are behind the other's plane, concavely if in front of it.
+    steps = ways[:, :1] - ways
+    both = row_dot(ups[:, :1], steps), -row_dot(ups, steps)
+    is_concave = (np.minimum(*both) > 0.0) & (row_dot(ups, ups[:, :1]) < AGREE)
+    front = np.where(np.maximum(*both) <= 0.0, above, -np.inf).max(axis=1)
     back = np.where(is_concave, above, np.inf).min(axis=1)
     return np.abs(np.minimum(front, back)), near[:, 0]
 
