@@ -276,22 +276,20 @@ def _off_planes(
         are as far off as it is curved
     """
     near, contacts = cloud.tree.query(points, ABREAST)[1], cloud.contacts
-    first = (np.einsum("nki,ni->nk", contacts.normals[near], normals) > AGREE).argmax(axis=1)
-    near[np.arange(len(near)), first], near[:, 0] = near[:, 0].copy(), near[np.arange(len(near)), first]
+    is_alike = np.einsum("nki,ni->nk", contacts.normals[near], normals) > AGREE
+    near = np.take_along_axis(near, np.argsort(~is_alike, axis=1, kind="stable"), axis=1)
     ways, ups = points[:, None] - contacts.points[near], contacts.normals[near]
-    above, sheet = row_dot(ups, ways), sheet_facing(charts, points, normals, most)
-    is_alike = np.einsum("nki,ni->nk", ups, sheet.normal) > AGREE
-    above = np.where(is_alike & (sheet.rho < INSIDE)[:, None], 0.0, above)
+    sheet, steps = sheet_facing(charts, points, normals, most), ways[:, :1] - ways
+    is_on = (np.einsum("nki,ni->nk", ups, sheet.normal) > AGREE) & (sheet.rho < INSIDE)[:, None]
+    above = np.where(is_on, 0.0, row_dot(ups, ways))
     # The plane of one that is aside may not reach the place, so it is off by no more than the first.
-    least, is_aside = np.abs(above[:, :1]), np.abs(above) < OVER * np.linalg.norm(ways, axis=2)
-    above = np.where(is_aside, np.clip(above, -least, least), above)
+    most_aside = np.where(np.abs(above) < OVER * np.linalg.norm(ways, axis=2), np.abs(above[:, :1]), np.inf)
+    above = np.clip(above, -most_aside, most_aside)
     # Two walls meet convexly if contacts of both are behind the other's plane, concavely if in front of it.
-    steps = ways[:, :1] - ways
-    both = row_dot(ups[:, :1], steps), -row_dot(ups, steps)
-    is_concave = (np.minimum(*both) > 0.0) & (row_dot(ups, ups[:, :1]) < AGREE)
-    front = np.where(np.maximum(*both) <= 0.0, above, -np.inf).max(axis=1)
-    back = np.where(is_concave, above, np.inf).min(axis=1)
-    return np.abs(np.minimum(front, back)), near[:, 0]
+    fronts = np.stack([row_dot(ups[:, :1], steps), -row_dot(ups, steps)])
+    is_concave = (fronts > 0.0).all(axis=0) & (row_dot(ups, ups[:, :1]) < AGREE)
+    front = np.where((fronts <= 0.0).all(axis=0), above, -np.inf).max(axis=1)
+    return np.abs(np.minimum(front, np.where(is_concave, above, np.inf).min(axis=1))), near[:, 0]
 
 
 def _doubts_of_surface(atlas: Atlas, noise: float, most: float) -> Iterator[Doubt]:
@@ -414,7 +412,7 @@ class _Cloud(NamedTuple):
             is_end[-1] = True
             end = is_end.argmax(axis=0)
             low, high = np.vstack([low, rays])[end, every], rays[end, every]
-        is_near = (away < AT_EDGE * self.contacts.reach[mine]) | (to_other < AT_EDGE * self.contacts.reach[other])
+        is_near = np.minimum(away / self.contacts.reach[mine], to_other / self.contacts.reach[other]) < AT_EDGE
         is_edge = is_beyond & is_near.reshape(rays.shape)
         return np.where(is_edge[end, every], low, np.minimum(low, domain))
 
