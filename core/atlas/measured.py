@@ -45,7 +45,6 @@ AT_EDGE = 0.45  # contacts has a spike of a twentieth of its size.
 RAY_PLACES, RAY_ROUNDS = 16, 2  # Where a patch ends is looked for at so many places on each ray, so often.
 ABREAST = 8  # Of this many neighbors the normals are to face the same way, or one is taken that does.
 SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
-OVER = 0.5
 OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
 # A ball is too large if neighbors below its centers lie the other way by more than this share of their
 # distance, for more than this share of links, at more than this share of centers; edges have up to a ninth.
@@ -266,14 +265,14 @@ def _off_surface(
 def _off_planes(
     charts: Charts, cloud: "_Cloud", most: float, points: Array, normals: Array
 ) -> tuple[Array, Indices]:
-    """How far places (n, 3) of the surface are off what nearest contacts enclose, and the nearest, (n,).
+    """How far places (n, 3) of the surface are off what nearest contacts enclose, and the first, (n,).
 
-    Between contacts the surface may be anywhere up to the plane of the nearest: an edge that no contact is
-    near is cut off by half of their distance. It is behind the planes of others if these are beyond a convex
-    edge, as a fin along a wall is not, and in front of one of them if they are beyond a concave one.
+    Between contacts the surface may be anywhere up to the plane of the nearest that faces alike, if any does:
+    an edge that no contact is near is cut off by half of their distance. Where others are around a convex
+    edge it is behind their planes, too, and before one of them around a concave edge. So the foot of an edge
+    that is cut off is on its wall, and a fin along one wall is off the other.
 
-    most : up to this length off a patch a place is on it, and the planes of contacts that face as it does
-        are as far off as it is curved
+    most : up to this length off a patch a place is on it, as far as contacts are concerned that face alike
     """
     near, contacts = cloud.tree.query(points, ABREAST)[1], cloud.contacts
     is_alike = np.einsum("nki,ni->nk", contacts.normals[near], normals) > AGREE
@@ -282,9 +281,6 @@ def _off_planes(
     sheet, steps = sheet_facing(charts, points, normals, most), ways[:, :1] - ways
     is_on = (np.einsum("nki,ni->nk", ups, sheet.normal) > AGREE) & (sheet.rho < INSIDE)[:, None]
     above = np.where(is_on, 0.0, row_dot(ups, ways))
-    # The plane of one that is aside may not reach the place, so it is off by no more than the first.
-    most_aside = np.where(np.abs(above) < OVER * np.linalg.norm(ways, axis=2), np.abs(above[:, :1]), np.inf)
-    above = np.clip(above, -most_aside, most_aside)
     # Two walls meet convexly if contacts of both are behind the other's plane, concavely if in front of it.
     fronts = np.stack([row_dot(ups[:, :1], steps), -row_dot(ups, steps)])
     is_concave = (fronts > 0.0).all(axis=0) & (row_dot(ups, ups[:, :1]) < AGREE)
@@ -386,9 +382,9 @@ class _Cloud(NamedTuple):
         """The radii (AZIMUTHS,) of a patch, in unit radius, to where its wall meets another or was not felt.
 
         Its domain is a hull of contacts, which ends at the last one before an edge, and may span what was not
-        felt, such as a notch or a hole. Beyond an edge the nearest contact is of a wall across it, and its
-        own wall is on the other side of the plane of that contact, or less than half as far from it. The
-        patch goes on beyond its domain only to an edge that is near a contact.
+        felt, such as a notch or a hole. Beyond an edge it is on the other side of the plane of the nearest
+        contact of a wall across it than its own nearest one, which may be nearer: otherwise a fin goes on
+        along the wall. The patch goes on beyond its domain only to an edge that is near a contact.
         """
         from scipy.spatial import cKDTree
 
@@ -412,7 +408,9 @@ class _Cloud(NamedTuple):
             is_end[-1] = True
             end = is_end.argmax(axis=0)
             low, high = np.vstack([low, rays])[end, every], rays[end, every]
-        is_near = np.minimum(away / self.contacts.reach[mine], to_other / self.contacts.reach[other]) < AT_EDGE
+        is_near = (
+            np.minimum(away / self.contacts.reach[mine], to_other / self.contacts.reach[other]) < AT_EDGE
+        )
         is_edge = is_beyond & is_near.reshape(rays.shape)
         return np.where(is_edge[end, every], low, np.minimum(low, domain))
 
