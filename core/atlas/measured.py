@@ -23,7 +23,7 @@ from ..triangles import row_dot
 from ..verdict import Doubt, beyond
 from .charts import AZIMUTHS, Charts
 from .connectivity import Indices, connected_pieces
-from .field import AGREE, covered
+from .field import AGREE, INSIDE, sheet_facing
 from .finger import FACING
 from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
@@ -117,10 +117,11 @@ def _judged(
     contacts, mesh, most = cloud.contacts, atlas.reference.mesh, atlas.tolerance or GROWN * radius
     off_surface = partial(_off_surface, atlas, noise, most)
     distances, far, is_turned = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
-    off_planes = partial(_off_planes, atlas.charts, cloud)
+    limit = MOST_OFF * float(np.ptp(contacts.points, axis=0).max())
+    off_planes = partial(_off_planes, atlas.charts, cloud, limit)
     between, alike = yield from chunked(off_planes, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
     worst, widest = _largest_cluster(far, distances, contacts.links), np.argsort(-between, kind="stable")
-    limit, fit_noise = MOST_OFF * float(np.ptp(contacts.points, axis=0).max()), 0.0 if cloud.noise else noise
+    fit_noise = 0.0 if cloud.noise else noise
     off = _doubts_of_contacts(contacts, distances, far, worst, is_turned, limit)
     gaps = widest[:0] if atlas.uncovered else widest[between[widest] > limit]
     sparse = [Doubt("sparse", between[i], limit, (place_text(mesh.vertices[[i]]),)) for i in gaps[:1]]
@@ -261,18 +262,30 @@ def _off_surface(
     return np.abs(distances), far | is_turned, is_turned
 
 
-def _off_planes(charts: Charts, cloud: "_Cloud", points: Array, normals: Array) -> tuple[Array, Indices]:
-    """How far places (n, 3) of the surface are off the planes of nearest contacts, and which these are, (n,).
+def _off_planes(
+    charts: Charts, cloud: "_Cloud", most: float, points: Array, normals: Array
+) -> tuple[Array, Indices]:
+    """How far places (n, 3) of the surface are off what nearest contacts enclose, and the first, (n,).
 
-    Of contacts nearby it is one that faces alike, if there is any. It is 0 on patches. Between them the
-    surface may be anywhere up to these planes: an edge that no contact is near is cut off by half of the
-    distance of contacts.
+    Between contacts the surface may be anywhere up to the plane of the nearest that faces alike, if any does:
+    an edge that no contact is near is cut off by half of their distance. Where others are around a convex
+    edge it is behind their planes, too, and before one of them around a concave edge. So the foot of an edge
+    that is cut off is on its wall, and a fin along one wall is off the other.
+
+    most : up to this length off a patch a place is on it, as far as contacts are concerned that face alike
     """
     near, contacts = cloud.tree.query(points, ABREAST)[1], cloud.contacts
     is_alike = np.einsum("nki,ni->nk", contacts.normals[near], normals) > AGREE
-    nearest = near[np.arange(len(points)), is_alike.argmax(axis=1)]
-    off = np.abs(row_dot(contacts.normals[nearest], points - contacts.points[nearest]))
-    return np.where(covered(charts, points, normals), 0.0, off), nearest
+    near = np.take_along_axis(near, np.argsort(~is_alike, axis=1, kind="stable"), axis=1)
+    ways, ups = points[:, None] - contacts.points[near], contacts.normals[near]
+    sheet, steps = sheet_facing(charts, points, normals, most), ways[:, :1] - ways
+    is_on = (np.einsum("nki,ni->nk", ups, sheet.normal) > AGREE) & (sheet.rho < INSIDE)[:, None]
+    above = np.where(is_on, 0.0, row_dot(ups, ways))
+    # Two walls meet convexly if contacts of both are behind the other's plane, concavely if in front of it.
+    fronts = np.stack([row_dot(ups[:, :1], steps), -row_dot(ups, steps)])
+    is_concave = (fronts > 0.0).all(axis=0) & (row_dot(ups, ups[:, :1]) < AGREE)
+    front = np.where((fronts <= 0.0).all(axis=0), above, -np.inf).max(axis=1)
+    return np.abs(np.minimum(front, np.where(is_concave, above, np.inf).min(axis=1))), near[:, 0]
 
 
 def _doubts_of_surface(atlas: Atlas, noise: float, most: float) -> Iterator[Doubt]:
@@ -369,31 +382,36 @@ class _Cloud(NamedTuple):
         """The radii (AZIMUTHS,) of a patch, in unit radius, to where its wall meets another or was not felt.
 
         Its domain is a hull of contacts, which ends at the last one before an edge, and may span what was not
-        felt, such as a notch or a hole. Beyond an edge the nearest contact is of a wall across it, and its
-        own wall is on the other side of the plane of that contact, or less than half as far from it. The
-        patch goes on beyond its domain only to an edge that is near a contact.
+        felt, such as a notch or a hole. Beyond an edge it is on the other side of the plane of the nearest
+        contact of a wall across it than its own nearest one, which may be nearer: otherwise a fin goes on
+        along the wall. The patch goes on beyond its domain only to an edge that is near a contact.
         """
         from scipy.spatial import cKDTree
 
         points, own, every = self.contacts.points, self.same_sheet(i, 2.0 * r.radius), np.arange(AZIMUTHS)
-        own_tree, turns = cKDTree(points[own]), 2.0 * np.pi * every / AZIMUTHS
-        domain = r.domain.radii(AZIMUTHS) / r.radius
+        # Contact i stands for those of other walls where there are none.
+        others = np.append(np.setdiff1d(self.tree.query_ball_point(points[i], 2.0 * r.radius), own), i)
+        own_tree, other_tree = (cKDTree(points[some]) for some in (own, others))
+        domain, turns = r.domain.radii(AZIMUTHS) / r.radius, 2.0 * np.pi * every / AZIMUTHS
         low, high = np.zeros(AZIMUTHS), domain + BETWEEN * self.contacts.reach[i] / r.radius
         for _ in range(RAY_ROUNDS):
             rays = np.linspace(low, high, RAY_PLACES + 1)[1:]
             x, y = r.radius * (rays * np.stack([np.cos(turns), np.sin(turns)])[:, None]).reshape(2, -1)
             places = r.frame.to_world(np.stack([x, y, r.height(x, y)], axis=1))
-            away, mine = own_tree.query(places)
-            (to_any, nearest), mine = self.tree.query(places), own[mine]
-            normals = self.contacts.normals[nearest]
-            above, own_above = (row_dot(normals, some - points[nearest]) for some in (places, points[mine]))
+            (away, mine), (to_other, other) = own_tree.query(places), other_tree.query(places)
+            mine, other = own[mine], others[other]
+            normals = self.contacts.normals[other]
+            above, own_above = (row_dot(normals, some - points[other]) for some in (places, points[mine]))
             is_other = np.abs(row_dot(normals, self.contacts.normals[mine])) < AGREE
-            is_beyond = (is_other & (above * own_above < 0.5 * above**2)).reshape(rays.shape)
+            is_beyond = (is_other & (above * own_above < 0.0)).reshape(rays.shape)
             is_end = is_beyond | (away > BETWEEN * self.contacts.reach[mine]).reshape(rays.shape)
             is_end[-1] = True
             end = is_end.argmax(axis=0)
             low, high = np.vstack([low, rays])[end, every], rays[end, every]
-        is_edge = is_beyond & (to_any < AT_EDGE * self.contacts.reach[nearest]).reshape(rays.shape)
+        is_near = (
+            np.minimum(away / self.contacts.reach[mine], to_other / self.contacts.reach[other]) < AT_EDGE
+        )
+        is_edge = is_beyond & is_near.reshape(rays.shape)
         return np.where(is_edge[end, every], low, np.minimum(low, domain))
 
     def longest_sure(self, i: int, radii: list[float], last: int) -> tuple[Reconstruction | None, int]:

@@ -239,11 +239,18 @@ def few_on_box(count):
 
 
 def test_edges_that_no_contact_is_near_are_a_doubt_that_names_one():
-    atlas = core.atlas_of([few_on_box(800)])
+    atlas = core.atlas_of([few_on_box(600)])
     assert atlas.status == "uncertain"
     assert "are so far apart that the surface between them may be off by" in atlas.message
     assert np.count_nonzero(BOX - np.abs(atlas.next_touch().point) < 0.06) > 1
     assert len(atlas.unexplained) > 1  # A finger may miss the first.
+
+
+def test_no_fin_along_a_wall_goes_on_past_the_edges_of_few_contacts():
+    atlas = core.atlas_of([few_on_box(800)])
+    assert atlas.status == "ok"
+    off = np.abs(atlas.reference.mesh.vertices) - BOX
+    assert off.max() < measured.MOST_OFF * 2.0 * BOX.max()
 
 
 def test_where_patches_lie_contacts_may_be_far_apart():
