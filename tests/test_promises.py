@@ -79,7 +79,7 @@ PROMISES = [
     ("methods", "At most one in a hundred contacts is off it by more than five", 100 * explained.FEW),
     ("methods", "off it by more than five deviations", verdict.SIGNIFICANT / 5),
     ("methods", "at most # % of the radius in the mean", 100 * extent.TAPS_OFF),
-    ("methods", "left after three rounds", touching.AGAIN / 3),
+    ("methods", "left after five rounds", touching.AGAIN / 5),
     ("methods", "within # of the radius, a linear map", posterior.QUARTIC_SHARE),
     ("viewport", "*Ctrl* snaps angles to #°", math.degrees(of("tactile_addon/viewport/drag", "SNAP"))),
     ("viewport", "about # contacts on the longest half curve", extent.CONTACTS),
