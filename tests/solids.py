@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whole objects to touch, by signed distances known in closed form; and the topology of a mesh."""
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 HAIR = 1e-12  # Distances below this share of the coordinates are rounding.
+# A ray that goes on beside a wall after this many steps takes none shorter than the length.
+MOST_STEPS, GRAZING = 2000, 1e-6
 
 
 @dataclass(frozen=True)
@@ -27,13 +30,14 @@ class Solid:
         (x, y, z), (a, b, c), f = origin, direction, self.distance
         gone, side = 0.0, math.copysign(1.0, f(x, y, z))
         hair = HAIR * max(1.0, abs(x) + abs(y) + abs(z))
-        while gone <= distance:
+        for count in itertools.count():
+            if gone > distance:
+                return None
             step = side * f(x + gone * a, y + gone * b, z + gone * c)
             if step < hair and gone > 0.0:
                 point = x + gone * a, y + gone * b, z + gone * c
                 return point, self.normal(*point)
-            gone += max(step, hair)
-        return None
+            gone += max(step, hair if count < MOST_STEPS else GRAZING)
 
     def normal(self, x, y, z, h=1e-6):
         f = self.distance
