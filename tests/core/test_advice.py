@@ -220,7 +220,7 @@ def confused():
 
 
 def sparse():
-    return [core.atlas_of([few_on_box(count)]).doubts for count in (800, 2000)]
+    return [core.atlas_of([few_on_box(count)]).doubts for count in (650, 2000)]
 
 
 def unfelt():
