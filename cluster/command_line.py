@@ -122,7 +122,7 @@ def _add_touches(add: Any) -> None:
     degrees = {"type": float, "nargs": "+", "metavar": "DEGREES"}
     add("--azimuths", **degrees, help="directions of planes that are not evenly spaced")
     add("--tilts", **degrees, help="tilts of the planes, one each (0)")
-    help = "length of each half curve, in the object's unit or as 6%% of its size (as far as can be trusted)"
+    help = "length of each half curve, in the object's unit or as 6%% of its size (the longest that is sure)"
     add("--extent", **LENGTH, help=help)
     add("--step", **LENGTH, help="distance between contacts (such that more would add little)")
     help = "add planes until heights are accurate to this (no planes are added)"

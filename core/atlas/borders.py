@@ -29,11 +29,12 @@ TURNED = 0.87  # A border has a corner where the cosine between its directions o
 STRAIGHT = 0.1  # if it is straight on both sides to this share of an edge.
 INWARD = 0.1  # Corners are felt this share of the way from there to the middle of the chord across them.
 SMOOTHINGS = 3  # This often directions of a border become the means of their neighbors'.
-UNFOLDINGS = 8  # Triangles that turn over are mended this often: most are after one.
+UNFOLDINGS = 8  # Triangles that turn over are mended this often; nearly all are after one (test_borders).
 EARS = 2  # This often triangles with two sides on the border are left out.
 ALONG = 0.5  # Ways agree if the cosine of the angle between them is more.
 NEAREST = 12  # The nearest segment is one of this many whose middles are nearest.
-SHORT = 0.01  # Sides of the border below this share of an edge are one place.
+# Sides of the border below this share of an edge are one place: with 1e-6 the triangle of one turns over at a
+SHORT = 0.01  # notch of an open sheet under SkylakeX (test_borders).
 SAME = 1e-6  # Lengths that differ by a smaller share are the same.
 
 PLACES_AT_ONCE = 1000  # A step feels this many places.
@@ -201,9 +202,9 @@ def snapped_to_border(mesh: Mesh, border: Border) -> Mesh:
 
 
 def _unfolded(mesh: Mesh, before: Mesh) -> Mesh:
-    """The mesh without the folds that came of moving the vertices of its border.
+    """The mesh without triangles that turned over when vertices of its border moved.
 
-    Of a triangle that turned over the ends of a side on the border meet, and the inner vertices move to the
+    Of such a triangle the ends of a side on the border meet in its middle, and the inner vertices move to the
     means of their neighbors.
 
     before : the same triangles before that
@@ -236,7 +237,7 @@ def _welded(mesh: Mesh) -> Mesh:
         first[first == first[two]] = first[one]
     triangles = first[mesh.triangles]
     _, index, counts = np.unique(np.sort(triangles, axis=1), axis=0, return_inverse=True, return_counts=True)
-    # Two triangles of the same vertices, one the other's back, come of a vertex with three neighbors.
+    # A vertex with three neighbors, of which two are welded, leaves two triangles back to back.
     some = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1) & (counts[index.ravel()] == 1)
     return mesh._replace(triangles=triangles).chosen(some)
 

@@ -42,7 +42,7 @@ PATCHES_APART, COVERED = 0.6, 1.0
 # A patch goes on to an edge where a contact is within this share of its neighbors' reach: with 0.3 an L whose
 # contacts end half a spacing before its edges is in doubt (test_measured), with 0.5 a pear of 400 even
 AT_EDGE = 0.45  # contacts has a spike of a twentieth of its size.
-RAY_PLACES, RAY_ROUNDS = 16, 2  # Where a patch ends is looked for at so many places on each ray, so often.
+RAY_PLACES, RAY_ROUNDS = 16, 2  # The places on each ray at which a patch may end, and the rounds of these.
 ABREAST = 8  # Of this many neighbors the normals are to face the same way, or one is taken that does.
 SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
 OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
@@ -272,7 +272,7 @@ def _off_planes(
     edge it is behind their planes, too, and before one of them around a concave edge. So the foot of an edge
     that is cut off is on its wall, and a fin along one wall is off the other.
 
-    most : up to this length off a patch a place is on it, as far as contacts are concerned that face alike
+    most : a place within this length of a patch is on it; contacts that face as the patch does agree with it
     """
     near, contacts = cloud.tree.query(points, ABREAST)[1], cloud.contacts
     is_alike = np.einsum("nki,ni->nk", contacts.normals[near], normals) > AGREE

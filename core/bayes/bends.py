@@ -24,9 +24,8 @@ from ..verdict import SIGNIFICANT
 # FEW_BENDS are those of folds or facets (benchmarks.curvatures: folds, tips of cones; a cylinder of 24 facets
 # has more). With 3 and 2, curvatures across folds without normals are off by over five deviations.
 FEW_BENDS, LEAST_BENDS = 3.5, 3.0
-STEPS_AROUND = (
-    9  # The steps around one whose median rate of turning is even: two folds are in up to four of them.
-)
+# The steps around one whose median rate of turning is even: two folds are in up to four of them.
+STEPS_AROUND = 9
 FOLD_BEND = 3.0  # A fold by an angle a bends a patch by up to 3 a / L, if it is next to the point.
 MOST_CHORDS = 24  # A curve without normals has at most this number of chords, as a touch has steps.
 SHORT_STEP = 0.1  # Steps count as this share of the mean at least: contacts in one place are no fold.

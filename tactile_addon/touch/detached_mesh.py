@@ -71,9 +71,8 @@ class DetachedMesh(PlacedMesh):
         self.points = co @ linear.T
         scale = np.linalg.norm(linear, axis=0).mean()
         if np.allclose(linear.T @ linear, scale**2 * np.eye(3), rtol=0.0, atol=SIMILAR * scale**2):
-            self._tree = BVHTree.FromObject(
-                obj, depsgraph
-            )  # Its rays take half the time of the object's own.
+            # Its rays take half the time of the object's own.
+            self._tree = BVHTree.FromObject(obj, depsgraph)
         else:
             self._tree, linear = _tree_in_world(mesh, linear), np.eye(3)
         rays = self._tree.ray_cast

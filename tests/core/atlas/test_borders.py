@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import core
-from core.atlas.borders import Border, snapped_to_border
+from core.atlas.borders import Border, _unfolded, _welded, snapped_to_border
 from core.atlas.meshing import Mesh
 from core.triangles import triangle_cross
 from tests import solids
@@ -140,6 +140,29 @@ def test_a_mesh_that_is_too_wide_or_too_narrow_ends_at_the_border_and_does_not_f
         assert areas.min() > -1e-12
         assert areas.sum() == pytest.approx(size**2)
         assert solids.topology(mesh.triangles).euler == 1
+
+
+def test_triangles_that_a_moved_border_turns_over_are_mended():
+    mesh, count = grid_mesh(), 8
+    vertices = mesh.vertices.copy()
+    vertices[count // 2, 0] = 1.2 / (count - 1)  # Past the inner vertex behind it.
+    vertices[-2:, 1] = vertices[[-1, -2], 1]  # Two vertices of the border pass each other.
+    folded = mesh._replace(vertices=vertices)
+    assert (triangle_cross(folded.vertices[folded.triangles])[:, 2] < 0.0).any()
+    found = _unfolded(folded, mesh)
+    assert (triangle_cross(found.vertices[found.triangles])[:, 2] > -1e-15).all()
+
+
+def test_a_short_side_of_the_border_leaves_no_two_triangles_back_to_back():
+    """The vertex 2 has the neighbors 0, 1 and 3 only."""
+    vertices = np.array(
+        [(0.0, 0.0, 0.0), (1e-3, 0.0, 0.0), (0.0, 0.4, 0.0), (0.0, 1.0, 0.0), (-1.0, 0.5, 0.0)]
+    )
+    vertices = np.vstack([vertices, [(1.0, 0.5, 0.0)]])
+    triangles = np.array([(0, 1, 2), (1, 3, 2), (0, 2, 3), (0, 3, 4), (1, 5, 3)])
+    welded = _welded(Mesh(vertices, triangles, np.zeros(6), np.zeros(6, dtype=int)))
+    assert len(welded.vertices) == 4
+    assert solids.topology(welded.triangles) == solids.Topology(4, 0, 1, 1)
 
 
 def test_a_mesh_without_a_border_stays():

@@ -136,6 +136,14 @@ def test_a_single_point_and_a_bridge_are_not_turned():
     assert turned(lattice, np.array([end]))[1].tolist() == [end]
 
 
+def test_points_that_are_simple_only_after_others_are_turned_are_turned_too():
+    values = np.full((9, 9, 9), -1.0)
+    values[2:7, 4, 4] = 1.0
+    lattice, _ = result_of(lattice_at_level(indicator_of(values), 0.1))
+    row = np.array([np.ravel_multi_index((i, 5, 5), lattice.shape) for i in range(3, 8)])
+    assert turned(lattice, row)[1].tolist() == row[[0, 1, 3, 4]].tolist()  # One point stays.
+
+
 def test_a_lattice_that_is_composed_stays():
     lattice, edges = result_of(lattice_at_level(ball_indicator(), 0.1))
     assert isinstance(lattice, Lattice)
