@@ -74,8 +74,8 @@ class Charts:
     def pairs(self, points: Array, near: float = np.inf) -> Pairs:
         """Pairs of places (k, 3) and the patches within the length `near`, and within REACH, of them."""
         reach = np.minimum(REACH, near / self.radii)
-        found = [self._pairs_at(points, reach, *some) for some in self._candidates(points, reach)]
-        return Pairs(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+        some_pairs = [self._pairs_at(points, reach, *some) for some in self._candidates(points, reach)]
+        return Pairs(*(np.concatenate(parts) for parts in zip(*some_pairs, strict=True)))
 
     def _candidates(self, points: Array, reach: Array) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         """Pairs of places and patches that may be within reach, sorted by place, about CHUNK at once."""
@@ -220,18 +220,18 @@ class Charts:
 
     def widened(self, factor: float) -> "Charts":
         """Tables of these patches whose deviations are larger by a factor."""
-        found = replace(self, stds=factor * self.stds)
-        vars(found)["is_flat"] = self.is_flat  # where cached_property looks: it does not depend on these
-        return found
+        wider = replace(self, stds=factor * self.stds)
+        vars(wider)["is_flat"] = self.is_flat  # where cached_property looks: it does not depend on these
+        return wider
 
     def joined(self, others: "Charts") -> "Charts":
         """The tables of these patches, followed by others."""
-        found = Charts(
+        both = Charts(
             *(np.concatenate([getattr(self, f.name), getattr(others, f.name)]) for f in fields(Charts))
         )
         # Otherwise each touch would look at the knots of all patches before it again.
-        vars(found)["is_flat"] = np.append(self.is_flat, others.is_flat)
-        return found
+        vars(both)["is_flat"] = np.append(self.is_flat, others.is_flat)
+        return both
 
     def rim_at(self, azimuths: NDArray[np.intp]) -> Array:
         """Local x and y (2, k) of the first patch's rim, at some of its AZIMUTHS."""

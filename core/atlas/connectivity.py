@@ -38,7 +38,7 @@ def split_sides(triangles: Indices, sides: Indices, new: int) -> Indices:
     at = np.minimum(np.searchsorted(keys[order], wanted), len(keys) - 1)
     middle = np.where(keys[order][at] == wanted, new + order[at], -1)
     halves = (middle >= 0).sum(axis=1)
-    found = [triangles[halves == 0]]
+    split = [triangles[halves == 0]]
     for count in (1, 2, 3):
         some, mid = triangles[halves == count], middle[halves == count]
         # With one side split, it comes first; with two, the whole one comes last.
@@ -50,5 +50,5 @@ def split_sides(triangles: Indices, sides: Indices, new: int) -> Indices:
             2: [(p, b, q), (a, p, q), (a, q, c)],
             3: [(a, p, r), (p, b, q), (r, q, c), (p, q, r)],
         }[count]
-        found += [np.stack(part, axis=1) for part in parts]
-    return np.concatenate(found)
+        split += [np.stack(part, axis=1) for part in parts]
+    return np.concatenate(split)

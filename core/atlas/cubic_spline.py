@@ -31,10 +31,10 @@ def bases(x: Array, y: Array, half: float) -> tuple[Any, Array]:
     (column, *by_x), (row, *by_y) = (bspline_weights(along / pitch) for along in (x, y))
     steps = np.arange(-1, 3)
     knots = (column[:, None, None] + steps[:, None]) * SIDE + row[:, None, None] + steps
-    found = [
+    shares = [
         by_x[i].T[:, :, None] * by_y[j].T[:, None] / pitch ** (i + j) for i, j in ((0, 0), (1, 0), (0, 1))
     ]
-    return knots.reshape(-1, 16), np.array(found).reshape(3, -1, 16)
+    return knots.reshape(-1, 16), np.array(shares).reshape(3, -1, 16)
 
 
 def bspline_weights(at: Array) -> tuple[Any, Array, Array]:

@@ -138,8 +138,8 @@ def vertices_shown(
     """
     from scipy.spatial import cKDTree
 
-    found = np.where(known[corners], corners, -1)
-    some, places = np.flatnonzero(found < 0), np.flatnonzero(known)
+    vertex = np.where(known[corners], corners, -1)
+    some, places = np.flatnonzero(vertex < 0), np.flatnonzero(known)
     if len(some) and len(places):
         tree, reach = cKDTree(points[places]), BESIDE * LEAST * edge
         away, at = tree.query(points[corners[some]], CANDIDATES, distance_upper_bound=reach)
@@ -147,8 +147,8 @@ def vertices_shown(
         cosine = np.where(np.isfinite(away), np.einsum("kbi,ki->kb", normals[at], facing[some]), -1.0)
         most = cosine.max(axis=1)
         nearest = np.argmax(cosine >= np.minimum(most, TURNED)[:, None], axis=1)
-        found[some] = np.where(most > LEAST_COSINE, at[np.arange(len(some)), nearest], -1)
-    return found
+        vertex[some] = np.where(most > LEAST_COSINE, at[np.arange(len(some)), nearest], -1)
+    return vertex
 
 
 def _fit_weingarten(distance: Array, local: Array, radius: Array) -> tuple[Array, Array, Array]:

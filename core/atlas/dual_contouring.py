@@ -132,16 +132,16 @@ def _turned_at_creases(
 def _sides(charts: Charts, band: float, places: Array) -> tuple[Any, ...]:
     """The fields of the Sides of places (n, 3), by the patches within the length `band` of these."""
     pairs, count = charts.pairs(places, band), len(places)
-    found, side = [*nearest_sheet(charts, pairs, count)], np.zeros(count)
+    sheets, side = [*nearest_sheet(charts, pairs, count)], np.zeros(count)
     for way in (-1.0, 1.0):
         some = pairs.chosen(np.sign(pairs.distance) == way)
         side += way * (np.bincount(some.point_index, minlength=count) > 0)
-        found += nearest_sheet(charts, some, count)
+        sheets += nearest_sheet(charts, some, count)
     # A wall ends at its rim. Where it meets another, both go on to the corner.
     up = np.stack([np.bincount(pairs.point_index, column, count) for column in pairs.normal.T], axis=1)
     walls_meet = np.linalg.norm(up, axis=1) < FACING * np.bincount(pairs.point_index, minlength=count)
     within = pairs.rho < np.where(walls_meet, CORNER, INSIDE)[pairs.point_index]
-    return *found, np.where(np.bincount(pairs.point_index, within, count) > 0.0, side, 0.0)
+    return *sheets, np.where(np.bincount(pairs.point_index, within, count) > 0.0, side, 0.0)
 
 
 def _planes(lattice: Lattice, sides: Sides, edges: Indices) -> tuple[Array, Blend]:
@@ -157,8 +157,8 @@ def _planes(lattice: Lattice, sides: Sides, edges: Indices) -> tuple[Array, Blen
     origin = lattice.places(inner)
     way = lattice.places(outer) - origin
     a, b = (np.searchsorted(sides.points, ends) for ends in (inner, outer))
-    found = sides.nearest.at(b)
-    shares, missed = _crossing(found, way, 1.0)
+    nearest = sides.nearest.at(b)
+    shares, missed = _crossing(nearest, way, 1.0)
     for sheet, end, most in (
         (sides.nearest.at(a), 0.0, 0.0),
         (sides.outside.at(b), 1.0, CROSSED),
@@ -166,7 +166,7 @@ def _planes(lattice: Lattice, sides: Sides, edges: Indices) -> tuple[Array, Blen
     ):
         share, miss = _crossing(sheet, way, end)
         is_better = (miss < missed) & (missed >= most)
-        found = sheet.where(is_better, found)
+        nearest = sheet.where(is_better, nearest)
         shares, missed = np.where(is_better, share, shares), np.where(is_better, miss, missed)
     at_inner, at_outer = (lattice.indicator.at(places) for places in (origin, origin + way))
     level = np.clip(at_inner / np.where(at_inner > at_outer, at_inner - at_outer, 1.0), 0.0, 1.0)
@@ -174,7 +174,7 @@ def _planes(lattice: Lattice, sides: Sides, edges: Indices) -> tuple[Array, Blen
     places = origin + np.where(is_felt, shares, level)[:, None] * way
     nothing = np.full(len(edges), np.inf)
     unfelt = Blend(level, nothing, lattice.indicator.outward(places), np.full(len(edges), -1), nothing)
-    return places, found.where(is_felt, unfelt)
+    return places, nearest.where(is_felt, unfelt)
 
 
 def _crossing(sheet: Blend, way: Array, end: float) -> tuple[Array, Array]:
@@ -270,7 +270,7 @@ def _cut(vertices: Array, quads: Indices, normals: Array, pitch: float) -> tuple
 
     def facing(some: Indices) -> Array:
         """The least cosine (n,) between the two triangles of quadrilaterals and their normals."""
-        halves = (triangle_cross(vertices[some[:, each]]) for each in ([0, 1, 2], [0, 2, 3]))
+        halves = (triangle_cross(vertices[some[:, corners]]) for corners in ([0, 1, 2], [0, 2, 3]))
         one, other = (row_dot(normalized(half), normals) for half in halves)
         least: Array = np.minimum(one, other)
         return least
@@ -303,5 +303,5 @@ def _triangles(quads: Indices, bent: Indices, first: int) -> tuple[Indices, Indi
     flat = np.setdiff1d(np.arange(len(quads)), bent)
     middles = np.arange(first, first + len(bent))
     sides = [np.column_stack([quads[bent][:, [i, (i + 1) % 4]], middles]) for i in range(4)]
-    halves = [quads[flat][:, each] for each in ([0, 1, 2], [0, 2, 3])]
+    halves = [quads[flat][:, corners] for corners in ([0, 1, 2], [0, 2, 3])]
     return np.concatenate(halves + sides), np.concatenate([np.tile(flat, 2), np.tile(bent, 4)])

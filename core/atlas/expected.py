@@ -60,8 +60,8 @@ def expected_touches(
         places, left = left[:AT_ONCE], left[AT_ONCE:]
         tried += len(places)
         covered = np.zeros(len(p), dtype=bool)
-        found = result_of(exploring_many(surface, p[places], up[places], options))
-        for place, e in zip(places, found, strict=True):
+        results = result_of(exploring_many(surface, p[places], up[places], options))
+        for place, e in zip(places, results, strict=True):
             if isinstance(e, ValueError) or covered[place]:
                 continue
             rim = _rim(surface, e, up[place], tolerance)
@@ -119,6 +119,8 @@ def covered_by(r: Reconstruction, rim: Array, points: Array, tolerance: float) -
     """
     x, y, z = r.frame.to_local(points).T
     azimuths = np.linspace(0.0, 2.0 * np.pi, len(rim), endpoint=False)
-    found: NDArray[np.bool_] = np.hypot(x, y) < np.interp(np.arctan2(y, x), azimuths, rim, period=2.0 * np.pi)
-    found[found] = np.abs(z[found] - r.height(x[found], y[found])) < NEAR * tolerance
-    return found
+    is_covered: NDArray[np.bool_] = np.hypot(x, y) < np.interp(
+        np.arctan2(y, x), azimuths, rim, period=2.0 * np.pi
+    )
+    is_covered[is_covered] = np.abs(z[is_covered] - r.height(x[is_covered], y[is_covered])) < NEAR * tolerance
+    return is_covered

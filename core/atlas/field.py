@@ -135,11 +135,11 @@ def argmin_per_point(place: NDArray[np.intp], key: NDArray[Any], count: int) -> 
 
     place : (m,), sorted
     """
-    found, starts = np.full(count, -1), np.flatnonzero(np.diff(place, prepend=-1))
+    least_pair, starts = np.full(count, -1), np.flatnonzero(np.diff(place, prepend=-1))
     least = np.minimum.reduceat(key, starts)
     those = np.flatnonzero(key == np.repeat(least, np.diff(starts, append=len(place))))[::-1]
-    found[place[those]] = those  # The first of equal ones stays.
-    return found
+    least_pair[place[those]] = those  # The first of equal ones stays.
+    return least_pair
 
 
 def _weighted_mean(pairs: Pairs, w: Array, count: int) -> Blend:
@@ -156,8 +156,8 @@ def _weighted_mean(pairs: Pairs, w: Array, count: int) -> Blend:
         return np.bincount(place, w * values, count).astype(np.float64)  # It counts no pairs in integers.
 
     some = total(np.ones(len(w)))
-    there = some > 0.0
-    scale = 1.0 / np.where(there, some, 1.0)
+    is_met = some > 0.0
+    scale = 1.0 / np.where(is_met, some, 1.0)
     rho = np.full(count, np.inf)
     np.minimum.at(rho, place[w > 0.0], pairs.rho[w > 0.0])
     mean = scale * total(pairs.distance)
@@ -169,8 +169,8 @@ def _weighted_mean(pairs: Pairs, w: Array, count: int) -> Blend:
     best = argmin_per_point(place, -w, count)
     return Blend(
         mean,
-        np.where(there, np.sqrt(variance), np.inf),
+        np.where(is_met, np.sqrt(variance), np.inf),
         up,
-        np.where(there, np.append(pairs.patch, -1)[best], -1),
+        np.where(is_met, np.append(pairs.patch, -1)[best], -1),
         rho,
     )

@@ -40,10 +40,10 @@ class Finger(NamedTuple):
         down, height = scaled(normal, -1.0), min(s, LOW * radius)
         # The patch may end a little beyond its surface.
         above = (along(along(point, normal, height), t, start) for start in (0.0, -0.5 * s))
-        found = next(filter(None, (self.met(p, down, 2.0 * height) for p in above)), None)
-        if found is None:
+        landed = next(filter(None, (self.met(p, down, 2.0 * height) for p in above)), None)
+        if landed is None:
             return None
-        at = along(found[0], normal, HAIR * radius)
+        at = along(landed[0], normal, HAIR * radius)
         for way, length in ((t, s), (down, 1.5 * s), (scaled(t, -1.0), 2.5 * s), (normal, 1.5 * s)):
             hit = self.surface.ray_cast(at, way, length)
             if hit is not None:
@@ -82,8 +82,8 @@ class Finger(NamedTuple):
 
     def _felt(self, hit: Hit | None, way: Vector) -> Contact | None:
         """The contact where a ray in this direction has hit, or None if it came from inside the object."""
-        found = None if hit is None else contact_of(hit, self.side)
-        return None if found is None or dot(found[1], way) >= 0.0 else found
+        contact = None if hit is None else contact_of(hit, self.side)
+        return None if contact is None or dot(contact[1], way) >= 0.0 else contact
 
 
 def finger_at(surface: Surface, point: Vector, outward: Vector, step: float) -> Finger:
@@ -97,8 +97,8 @@ def finger_at(surface: Surface, point: Vector, outward: Vector, step: float) -> 
 def _disk_around(normal: Vector, tangent: Vector) -> list[Vector]:
     """Places (DISK_PLACES, 3) spread evenly over the unit disk across a unit normal, as in a sunflower."""
     e1, golden = tangent_of(normal, tangent), math.pi * (3.0 - math.sqrt(5.0))
-    e2, found = cross(normal, e1), []
+    e2, places = cross(normal, e1), []
     for i in range(DISK_PLACES):
         out = math.sqrt((i + 0.5) / DISK_PLACES)
-        found.append(along(scaled(e1, out * math.cos(i * golden)), e2, out * math.sin(i * golden)))
-    return found
+        places.append(along(scaled(e1, out * math.cos(i * golden)), e2, out * math.sin(i * golden)))
+    return places

@@ -140,12 +140,12 @@ class Frontier:
     def next_touches(self, count: int) -> Generator[None, None, list[Next]]:
         """At most `count` touches, far apart, that bring most. Yields each time before it looks at places."""
         yield from self._forget_covered()
-        found: list[Next] = []
+        chosen: list[Next] = []
         aside: list[tuple[float, int, RimPlace]] = []
         touches: dict[RimPlace, Next | None] = {}
-        while self.queue and len(found) < count:
+        while self.queue and len(chosen) < count:
             _, _, place = entry = heapq.heappop(self.queue)
-            distances = ((other, TOUCHES_APART * max(place.radius, other.place.radius)) for other in found)
+            distances = ((other, TOUCHES_APART * max(place.radius, other.place.radius)) for other in chosen)
             if any(math.dist(place.point, other.point) < apart for other, apart in distances):
                 aside.append(entry)
                 continue
@@ -160,10 +160,10 @@ class Frontier:
             if touch is not None and self.queue and touch.gain < -self.queue[0][0]:
                 self.push(place, touch.gain)
             elif touch is not None:
-                found.append(touch)
+                chosen.append(touch)
         for entry in aside:
             heapq.heappush(self.queue, entry)
-        return found
+        return chosen
 
     def uncovered(
         self, reference: ReferenceMesh, tolerance: float
@@ -174,7 +174,7 @@ class Frontier:
 
         Yields 1 after each.
         """
-        found = []
+        uncovered = []
         for place in border_places(reference.mesh):
             yield 1.0
             contacts = [
@@ -184,8 +184,8 @@ class Frontier:
             # Across a notch the finger meets the mesh again.
             off = [c for c in contacts if c is not None and reference.away(c[0]) > tolerance]
             if off:
-                found.append((place, off[-1]))
-        return found
+                uncovered.append((place, off[-1]))
+        return uncovered
 
     def unfelt(self, mesh: Mesh) -> Generator[float, None, list[tuple[RimPlace, Contact]]]:
         """Places of pieces of a closed surface where nothing was felt, each with a contact there.
@@ -193,7 +193,7 @@ class Frontier:
         In a piece they are as far apart as the sides of a square of its area. Pieces on most of which the
         finger meets nothing are no surface, as beyond a border. Yields 1 after each.
         """
-        found, sides, normals = [], mesh.triangles, mesh.normals
+        unfelt, sides, normals = [], mesh.triangles, mesh.normals
         count, piece = connected_pieces(sides[:, :2].ravel(), sides[:, 1:].ravel(), len(mesh.vertices))
         areas = 0.5 * np.linalg.norm(triangle_cross(mesh.vertices[sides]), axis=1)
         for one, side in enumerate(np.sqrt(np.bincount(piece[sides[:, 0]], areas, count)).tolist()):
@@ -208,8 +208,8 @@ class Frontier:
             for contact in contacts if 2 * len(contacts) > len(some) else ():
                 if all(math.dist(contact[0], other[0]) > side for other in chosen):
                     chosen.append(contact)
-            found += [(RimPlace(*c, tangent_of(c[1], None), side), c) for c in chosen]
-        return found
+            unfelt += [(RimPlace(*c, tangent_of(c[1], None), side), c) for c in chosen]
+        return unfelt
 
     def _forget_covered(self) -> Generator[None, None, None]:
         """Takes the places that patches now cover out of the queue; yields between its steps."""
@@ -224,18 +224,18 @@ class Frontier:
 
     def beyond(self, places: Sequence[RimPlace]) -> list[Next | None]:
         """The touch that goes on from each place, or None if it would bring nothing."""
-        found: list[Next | None] = [None] * len(places)
+        touches: list[Next | None] = [None] * len(places)
         middles = self._probe_disks(places)
         for share in REACHES:
-            left = [i for i, touch in enumerate(found) if touch is None]
+            left = [i for i, touch in enumerate(touches) if touch is None]
             new = [places[i] for i in left if (places[i], share) in middles]
             wide = min(1.0, DISK_REACHES * share)
             disks = [self._disk(place, middles[place, share], wide * place.radius) for place in new]
             for place, disk in zip(new, self._uncovered_part(disks), strict=True):
                 place.felt[share] = disk
             for i in left:
-                found[i] = self._touch(places[i], share)
-        return found
+                touches[i] = self._touch(places[i], share)
+        return touches
 
     def _disk(self, place: RimPlace, contact: Contact, radius: float) -> Array:
         """What the finger feels around a contact beyond a place, (k, 2, 3)."""

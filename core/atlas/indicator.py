@@ -92,10 +92,10 @@ def solve_poisson(
         values[slab] /= waves[0][slab[0], None, None] + waves[1][:, None] + waves[2]
         yield 0.0
     yield from _transform(values, idst)
-    found = Indicator(values, low, cell, size, thinnest)
-    values -= np.average(found.at(points), weights=np.linalg.norm(areas, axis=1))
+    indicator = Indicator(values, low, cell, size, thinnest)
+    values -= np.average(indicator.at(points), weights=np.linalg.norm(areas, axis=1))
     yield 0.0
-    return found
+    return indicator
 
 
 def _transform(values: NDArray[np.float32], sine: Callable[..., Any]) -> Generator[float, None, None]:

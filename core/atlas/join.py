@@ -54,20 +54,20 @@ def refit(
 
     def pairs_of(some: Array, indices: NDArray[np.intp]) -> Pairs:
         """The pairs of some of the contacts, with the indices that these have among all."""
-        found = charts.pairs(some)
-        return found._replace(point_index=indices[found.point_index])
+        pairs = charts.pairs(some)
+        return pairs._replace(point_index=indices[pairs.point_index])
 
     every = np.arange(len(points))
     pairs = Pairs._make((yield from chunked(pairs_of, PLACES_AT_ONCE, 0.0, points, every)))
     for order in ROUGHNESS:  # Otherwise the first spline would take ten times as long as the others.
         penalty(order)
         yield 0.0
-    each = np.argsort(pairs.patch, kind="stable")
+    by_patch = np.argsort(pairs.patch, kind="stable")
     yield 0.0
-    bounds = np.searchsorted(pairs.patch[each], np.arange(len(results) + 1))
+    bounds = np.searchsorted(pairs.patch[by_patch], np.arange(len(results) + 1))
     tables: list[Table] = []
     for i, r in enumerate(results):
-        some = pairs.chosen(each[bounds[i] : bounds[i + 1]])
+        some = pairs.chosen(by_patch[bounds[i] : bounds[i + 1]])
         if i not in earlier or earlier[i][0] != len(some.point_index):
             table = _joined_table(r, charts.rims[i], some, points, normals, owner == i, noise)
             earlier[i] = len(some.point_index), table
@@ -187,5 +187,5 @@ def _half(rim: Array) -> float:
 
 def _stds(r: Reconstruction, x: Array, y: Array) -> Array:
     """Deviations (SIDE, SIDE), computed at every other knot, because they are smooth and cost the most."""
-    x, y = (each.reshape(SIDE, SIDE)[::2, ::2] for each in (x, y))
+    x, y = (along.reshape(SIDE, SIDE)[::2, ::2] for along in (x, y))
     return upsampled(r.height_std(x.ravel(), y.ravel()).reshape(x.shape) / r.radius)

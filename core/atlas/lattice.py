@@ -91,13 +91,13 @@ def lattice_at_level(indicator: Indicator, pitch: float) -> Generator[float, Non
     """A well-composed lattice of a pitch, and its edges (n,) whose ends differ; yields 0 in between."""
     length, ratio = len(indicator.values), indicator.cell / pitch
     shape = tuple(int(np.ceil((count - 1) * ratio)) + 4 for count in indicator.values.shape)
-    lattice, found = Lattice(indicator, pitch, shape, np.zeros(0, dtype=np.intp)), []
+    lattice, near_level = Lattice(indicator, pitch, shape, np.zeros(0, dtype=np.intp)), []
     rows = max(1, int(POINTS_AT_ONCE * length / (indicator.values.size * max(ratio, 1.0) ** 2)))
     for start in range(0, length - 1, rows):
         cells = _cells(indicator.values[start : start + rows + 1] > 0.0) + np.array([start, 0, 0])
-        found.append(_edges_near(lattice, cells * ratio, (cells + 1) * ratio))
+        near_level.append(_edges_near(lattice, cells * ratio, (cells + 1) * ratio))
         yield 0.0
-    edges = np.unique(np.concatenate(found))
+    edges = np.unique(np.concatenate(near_level))
     lattice = composed(lattice, lattice.cells_around(np.unique(lattice.ends(edges))))
     yield 0.0
     return lattice, lattice.crossed(np.union1d(edges, lattice.edges_around(lattice.turned)))
@@ -123,13 +123,13 @@ def _edges_near(lattice: Lattice, low: Array, high: Array) -> Indices:
         near[tuple((np.minimum(first + step, last) - base).T)] = True
     index = np.argwhere(near)
     points = (index + base + 1) @ lattice.strides
-    inside, found = np.zeros(near.shape, dtype=bool), []
+    inside, edges = np.zeros(near.shape, dtype=bool), []
     inside[near] = lattice.inside(points)
     for axis in range(3):
         before, after = ((slice(None),) * axis + (part,) for part in (slice(None, -1), slice(1, None)))
         crossed = near[before] & near[after] & (inside[before] != inside[after])
-        found.append(3 * ((np.argwhere(crossed) + base + 1) @ lattice.strides) + axis)
-    return np.concatenate(found)
+        edges.append(3 * ((np.argwhere(crossed) + base + 1) @ lattice.strides) + axis)
+    return np.concatenate(edges)
 
 
 def composed(lattice: Lattice, cells: Indices) -> Lattice:

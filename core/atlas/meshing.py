@@ -214,6 +214,6 @@ def _unfelt(
         (off,) = yield from chunked(lambda some: (ended(some),), PLACES_AT_ONCE, 0.9, middles[is_beyond])
         gone |= np.bincount(where, np.where(off, 1.0, -1.0), count) > 0.0
     yield 0.9
-    found = is_beyond.copy()
-    found[is_beyond] = gone[where]
-    return found
+    is_gone = is_beyond.copy()
+    is_gone[is_beyond] = gone[where]
+    return is_gone

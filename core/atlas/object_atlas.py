@@ -257,10 +257,10 @@ class Atlas(Judged):
         taken off the variance of their mean and does not grow, so they grow more than once. Yields 1 after
         each.
         """
-        found, count = self, self.check.at_random
+        atlas, count = self, self.check.at_random
         within = ~self.contradicting[:count]
         for _ in range(WIDENINGS):
-            distance, std = (values[:count] for values in found._contacts)
+            distance, std = (values[:count] for values in atlas._contacts)
             felt = np.isfinite(std) & within
             if not felt.any():
                 break
@@ -268,10 +268,10 @@ class Atlas(Judged):
             factor = float(np.quantile(stds, 0.9)) / WITHIN_90
             if factor <= 1.0:
                 break
-            charts, reference = found.charts.widened(factor), found.reference.widened(factor)
-            found = replace(found, charts=charts, reference=reference)
+            charts, reference = atlas.charts.widened(factor), atlas.reference.widened(factor)
+            atlas = replace(atlas, charts=charts, reference=reference)
             yield 1.0
-        return found
+        return atlas
 
     def next_touch(self, failed: ArrayLike = ()) -> NextTouch | None:
         """Where the next touch would bring most, or None if all is covered to the tolerance and explained.

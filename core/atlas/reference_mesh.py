@@ -90,9 +90,9 @@ class ReferenceMesh:
 
     def widened(self, factor: float) -> "ReferenceMesh":
         """A mesh of the same triangles whose deviations are larger by a factor."""
-        found = replace(self, mesh=self.mesh._replace(std=factor * self.mesh.std))
-        vars(found).update({name: vars(self)[name] for name in PREPARED if name in vars(self)})
-        return found
+        wider = replace(self, mesh=self.mesh._replace(std=factor * self.mesh.std))
+        vars(wider).update({name: vars(self)[name] for name in PREPARED if name in vars(self)})
+        return wider
 
     def prepared(self) -> Generator[float, None, None]:
         """Finds what distances need, in steps; yields 1 after each."""
@@ -143,11 +143,11 @@ class ReferenceMesh:
         # A triangle is a chord: the foot of its plane is a little off that of the surface.
         across = off - ahead[:, None] * surface.normal
         some = np.flatnonzero((np.abs(ahead) > AHEAD * away) & (np.linalg.norm(across, axis=1) < self.edge))
-        there, tried = self._project(charts, feet[some] + across[some], up[some])
+        tried_surface, tried = self._project(charts, feet[some] + across[some], up[some])
         left = np.linalg.norm(points[some] - tried, axis=1)
-        nearer = (left < away[some]) & (np.abs(there.distance) < there.std)
+        nearer = (left < away[some]) & (np.abs(tried_surface.distance) < tried_surface.std)
         some = some[nearer]
-        for old, new in zip((away, feet, *surface), (left, tried, *there), strict=True):
+        for old, new in zip((away, feet, *surface), (left, tried, *tried_surface), strict=True):
             old[some] = new[nearer]
         ahead = row_dot(points - feet, surface.normal)
         smooth = np.abs(ahead) > AHEAD * away

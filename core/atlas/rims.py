@@ -105,9 +105,9 @@ def _offsets(r: Reconstruction, finger: Finger, near: float, xy: Array) -> Array
     z, right, ahead = r.height(np.append(x, [x + step, x]), np.append(y, [y, y + step])).reshape(3, -1)
     up = np.stack([z - right, z - ahead, np.full(len(z), step)], axis=1) @ r.frame.axes.T
     up /= np.linalg.norm(up, axis=1, keepdims=True)
-    found = np.full(len(z), np.inf)
+    offsets = np.full(len(z), np.inf)
     places = r.frame.to_world(np.stack([x, y, z], axis=1)).tolist()
     for i in np.flatnonzero(up @ r.frame.axes[:, 2] > STEEP):
         contact = finger.near(vector_of(places[i]), vector_of(up[i]), near)
-        found[i] = math.inf if contact is None else math.dist(places[i], contact[0])
-    return found
+        offsets[i] = math.inf if contact is None else math.dist(places[i], contact[0])
+    return offsets

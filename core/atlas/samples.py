@@ -82,8 +82,8 @@ def samples_of(charts: Charts, pitch: float) -> Generator[float, None, Samples]:
         y[middle],
     )
     flat = ((2.0 * half * charts.radii / across) ** 2)[patch]
-    each = patch, x, y, flat, others[group], thickness[group]
-    return Samples._make((yield from chunked(partial(_samples, charts), SAMPLES_AT_ONCE, 0.0, *each)))
+    columns = patch, x, y, flat, others[group], thickness[group]
+    return Samples._make((yield from chunked(partial(_samples, charts), SAMPLES_AT_ONCE, 0.0, *columns)))
 
 
 def _sample_grid(
@@ -95,9 +95,9 @@ def _sample_grid(
 
     Also the sample in the middle of each group of neighbors, (g,), and the group of each sample, (n,).
     """
-    each = np.maximum(1, np.minimum(across // ACROSS, PARTS))  # Samples of a group, along each axis.
+    sides = np.maximum(1, np.minimum(across // ACROSS, PARTS))  # Samples of a group, along each axis.
     places, groups = [], 0
-    for i, (count, few) in enumerate(zip(across.tolist(), each.tolist(), strict=True)):
+    for i, (count, few) in enumerate(zip(across.tolist(), sides.tolist(), strict=True)):
         line = half[i] * ((2.0 * np.arange(count) + 1.0) / count - 1.0)
         x, y = (axis.ravel() for axis in np.meshgrid(line, line, indexing="ij"))
         row, column = np.divmod(np.arange(count**2), count)

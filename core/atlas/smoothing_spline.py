@@ -116,19 +116,19 @@ def smoothing_spline(contacts: Array, normals: Array, weights: Array, half: floa
     grids["noise"] = tuple(noise * factor for factor in NOISE_FACTORS)
     equations = _equations([heights, slopes], [weights, weights * certainty])
     for _ in range(PASSES):
-        found = _solved(equations, hyperparameters, half)
+        best = _solved(equations, hyperparameters, half)
         for name, grid in grids.items():
-            found = _ascended(equations, found, name, grid, half)
-        residuals = np.abs(np.einsum("nk,nk->n", basis[0], found.coefficients()[knots]) - values[0])
-        weights, hyperparameters = _student(residuals, found.hyperparameters.noise), found.hyperparameters
+            best = _ascended(equations, best, name, grid, half)
+        residuals = np.abs(np.einsum("nk,nk->n", basis[0], best.coefficients()[knots]) - values[0])
+        weights, hyperparameters = _student(residuals, best.hyperparameters.noise), best.hyperparameters
         equations = _equations([heights, slopes], [weights, weights * certainty])
         if hyperparameters.noise == noise:
             break  # Outlying contacts, which make the noise look larger, did not count.
     # The other order keeps these deviations: intervals hold better than with smaller ones.
     other = hyperparameters._replace(order=ROUGHEST, roughness=ROUGHNESS[ROUGHEST][START])
     rough = _ascended(equations, _solved(equations, other, half), "roughness", ROUGHNESS[ROUGHEST], half)
-    found = min(_solved(equations, hyperparameters, half), rough, key=lambda each: each.neg2_log_evidence)
-    return Spline(found.coefficients().reshape(SIDE, SIDE), _stds(found.factor))
+    best = min(_solved(equations, hyperparameters, half), rough, key=lambda each: each.neg2_log_evidence)
+    return Spline(best.coefficients().reshape(SIDE, SIDE), _stds(best.factor))
 
 
 def _equations(columns: Sequence[_Columns], weights: Sequence[Array]) -> _Equations:
@@ -189,8 +189,8 @@ def _triangular(factor: Array, right: Array, trans: str) -> Array:
     """L^-1, or L^-T with "T", times right sides (SIDE^2,) or (SIDE^2, k), for a Cholesky factor L."""
     from scipy.linalg.lapack import dtbtrs
 
-    found: Array = dtbtrs(factor, right, uplo="L", trans=trans)[0]
-    return found.reshape(right.shape)
+    solved: Array = dtbtrs(factor, right, uplo="L", trans=trans)[0]
+    return solved.reshape(right.shape)
 
 
 def _columns(knots: Any, basis: Array, values: Array) -> _Columns:
@@ -227,9 +227,9 @@ def _heights_at_coarse_knots() -> Array:
     """What coefficients contribute to the heights at every other knot, (SIDE^2, k)."""
     x, y = np.meshgrid(*2 * [np.linspace(-1.0, 1.0, SIDE)[::2]], indexing="ij")
     at, basis = bases(x.ravel(), y.ravel(), 1.0)
-    found = np.zeros((SIDE**2, len(at)), order="F")
-    np.add.at(found, (at, np.arange(len(at))[:, None]), basis[0])
-    return found
+    heights = np.zeros((SIDE**2, len(at)), order="F")
+    np.add.at(heights, (at, np.arange(len(at))[:, None]), basis[0])
+    return heights
 
 
 @cache

@@ -279,15 +279,15 @@ class _Run:
         starts, aims, facing, length = rays_at(reference)
         yield 1.0
         ways = (aims - starts) / np.linalg.norm(aims - starts, axis=1, keepdims=True)
-        found, missed, at_random, met = [], [], 0, self.frontier.finger.met
+        contacts, missed, at_random, met = [], [], 0, self.frontier.finger.met
         for i, (start, way, aim) in enumerate(zip(starts, ways, aims, strict=True)):
             contact = met(vector_of(start), vector_of(way), length)
             if contact is not None:
-                found.append(contact)
+                contacts.append(contact)
                 at_random += i < CHECKS
             elif i < len(facing) and facing[i] and not self._is_near(vector_of(aim), vector_of(way)):
                 missed.append(aim)
-        points, normals = np.array(found).reshape(-1, 2, 3).transpose(1, 0, 2)
+        points, normals = np.array(contacts).reshape(-1, 2, 3).transpose(1, 0, 2)
         return Check(points, normals, np.array(missed).reshape(-1, 3), at_random)
 
     def _is_near(self, aim: Vector, way: Vector) -> bool:
@@ -350,15 +350,15 @@ class _Run:
     def uncertain_contacts(self, mesh: Mesh) -> list[PointNormal]:
         """Contacts where the surface is less certain than LIMIT tolerances, apart from each other."""
         left, normals = np.flatnonzero(mesh.std > LIMIT * self.tolerance), mesh.normals
-        found: list[PointNormal] = []
+        contacts: list[PointNormal] = []
         while len(left):
             worst = left[np.argmax(mesh.std[left])]
             point, normal = vector_of(mesh.vertices[worst]), vector_of(normals[worst])
             contact = self.frontier.finger.near(point, normal, self.frontier.near)
-            found += [contact] if contact else []
+            contacts += [contact] if contact else []
             apart = AGAIN_APART * self.frontier.charts.radii[mesh.patch[worst]]
             left = left[((mesh.vertices[left] - mesh.vertices[worst]) ** 2).sum(axis=1) > apart**2]
-        return found
+        return contacts
 
 
 def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], float]:
