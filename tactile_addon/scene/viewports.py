@@ -22,15 +22,22 @@ def shows_colors(space: Any) -> bool:
 
 def has_gesture() -> bool:
     """Whether something is being dragged in any window, which then keeps pointers to it."""
-    windows = bpy.context.window_manager.windows
-    names = [operator.bl_idname for window in windows for operator in window.modal_operators]
-    return any(name.startswith(GESTURES) or "_move" in name for name in names)
+    running = [each for window in bpy.context.window_manager.windows for each in window.modal_operators]
+    return any(each.bl_idname.startswith(GESTURES) or "_move" in each.bl_idname for each in running)
 
 
 def _viewports() -> Iterator[Any]:
     """The spaces of all 3D viewports. A file made without a window has some, too, in which it is opened."""
-    areas = (area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D")
-    return (area.spaces.active for area in areas)
+    for screen in bpy.data.screens:
+        yield from (area.spaces.active for area in screen.areas if area.type == "VIEW_3D")
+
+
+def redraw(context: bpy.types.Context, kind: str) -> None:
+    """Has the regions of a kind drawn again in all viewports of the window; none while that is closed."""
+    for area in context.window.screen.areas if context.window else ():
+        for region in area.regions if area.type == "VIEW_3D" else ():
+            if region.type == kind:
+                region.tag_redraw()
 
 
 def show_colors(chosen: Any = None) -> None:

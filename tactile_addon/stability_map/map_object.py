@@ -156,8 +156,11 @@ def swatches(painted: Object) -> list[tuple[str, tuple[float, ...]]]:
     if painted.tactile_map_colors != REASON:
         refused = sum(counts[key] for key in REASON_KEYS[2:])
         return [(f"No Patch: {refused}", REFUSED)] if refused else []
-    names = zip(REASONS, REASON_COLORS, strict=True)
-    return [(f"{name}: {counts[key]}", tuple(c)) for (key, name, _), c in names if counts[key]]
+    return [
+        (f"{name}: {counts[key]}", tuple(color))
+        for (key, name, _), color in zip(REASONS, REASON_COLORS, strict=True)
+        if counts[key]
+    ]
 
 
 def touched_near(painted: Object, location: list[float]) -> list[float]:
@@ -242,7 +245,7 @@ def map_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     ]
 
 
-def facets(record: Mapping[str, Any]) -> str | None:
+def map_facets(record: Mapping[str, Any]) -> str | None:
     """A sentence if half of the patches or more follow facets, as the verdict on a patch has it; or None."""
     count = record.get("few_facets", 0)
     if count < max(FACETED * record["patches"], 1):

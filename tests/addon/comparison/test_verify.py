@@ -162,11 +162,11 @@ def test_the_scenes_unit_is_the_panels(empty, patch, extension):
     found = verified(empty, patch)
     unit = addon.touch.units.unit_of(empty.context.scene, patch["tactile"]["radius"])
     head, *rows, points = addon.comparison.operators.verification_table(patch["tactile"])
-    assert head == ("in mm", "Mesh", "Contacts")
+    assert head == ("in mm", "Mesh | Contacts")
     assert [row[0] for row in rows] == ["Mean", "Median", "Maximum", "RMS"]
-    assert rows[0][1] == f"{found['vertex_distance_mean']:.3g}"
-    assert points == ("Points", str(found["vertices"]), "60")
-    rows = dict(addon.comparison.operators.verification_rows(patch["tactile"]))
+    assert rows[0][1].startswith(f"{found['vertex_distance_mean']:.3g} | ")
+    assert points == ("Points", f"{found['vertices']} | 60")
+    rows = dict(addon.comparison.operators.main_rows(patch["tactile"]))
     assert rows["Overlap"] == "100 %"
     farthest = np.abs(values(patch.data, "deviation")).max()
     assert rows["Largest Deviation"] == addon.touch.units.say(farthest, 1, unit)
