@@ -143,19 +143,16 @@ def verification_summary(record: TouchReport) -> tuple[bool, str]:
     name, vertices, percent = found["target"], found["vertices"], 100.0 * found["overlap"]
     if not (vertices or percent or found["extra_points"]):
         return True, f'Nothing of "{name}" is below the patch: move one to the other, or choose another mesh'
-    if not vertices:
-        return (
-            True,
-            f'"{name}" has no vertices over the patch to measure, only faces, over {percent:.0f} % of it',
-        )
     if record["status"] != "ok":
         return True, record["message"]
-    mean = _length(record, "vertex_distance_mean")
+    where, mean = f"At {many(vertices, 'vertex', 'vertices')}, ", _length(record, "vertex_distance_mean")
+    if not vertices:  # A coarse mesh may have only faces there.
+        where, mean = "", dict(main_rows(record))["Deviation"]
     most = _length(
         record, max("vertex_distance_max", "patch_distance_max", key=lambda key: found.get(key, 0.0))
     )
     return False, (
-        f'At {many(vertices, "vertex", "vertices")}, "{name}" is {mean} off the patch on average, and '
+        f'{where}"{name}" is {mean} off the patch on average, and '
         f"either is {most} off the other at most; the mesh covers {percent:.0f} % of the patch"
     )
 

@@ -214,7 +214,7 @@ def test_a_coarse_mesh_has_no_vertices_over_the_patch(empty, capfd):
     assert (found["vertices"], found["overlap"], found["extra_contours"]) == (0, 1.0, 9)
     assert found["extra_fit_error"] == pytest.approx(0.0, abs=1e-5)
     assert "vertex_distance_mean" not in found
-    words = '"Plane" has no vertices over the patch to measure, only faces, over 100 % of it'
+    words = 'Info: "Plane" is 0 m off the patch on average, and either is 0 m off the other at most'
     assert words in capfd.readouterr().out
 
 
