@@ -8,9 +8,9 @@ from typing import Any
 import bpy
 
 NEAREST, FARTHEST = 0.02, 20.0  # The distances, in sizes of an object, between which it is shown.
-# If a view is clipped nearer than at this share of the size, which Blender itself does not do below 1 cm, its
-# depths are so coarse that a patch and the mesh run through each other.
-COARSE, OWN = 5e-4, 0.01
+# If a view is clipped nearer than at this share of the size, as Blender itself does from 20 m on, its depths
+# are so coarse that a patch or a map and the mesh run through each other.
+COARSE = 5e-4
 GESTURES = ("TRANSFORM_OT_", "TACTILE_OT_")
 
 
@@ -52,5 +52,5 @@ def show_colors(chosen: Any = None) -> None:
 def show_size(size: float) -> None:
     """Makes all viewports show an object of this size from near by and from afar, if they do not yet."""
     for space in _viewports() if size > 0.0 else ():
-        space.clip_start = min(max(space.clip_start, min(COARSE * size, OWN)), NEAREST * size)
+        space.clip_start = min(max(space.clip_start, COARSE * size), NEAREST * size)
         space.clip_end = max(space.clip_end, FARTHEST * size)

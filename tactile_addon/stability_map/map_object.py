@@ -29,7 +29,7 @@ from ..scene.mesh_data import (
     write,
 )
 from ..scene.shown import LEAST_LENGTH
-from ..scene.viewports import show_colors
+from ..scene.viewports import show_colors, show_size
 from ..touch import units
 from ..touch.evaluated_mesh import read_array
 from ..touch.settings import MOST_PLANES, NAMES, TouchSettings, length_property, touch_arguments
@@ -99,6 +99,7 @@ def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Ob
     # Where one reason holds everywhere, its color shows nothing; setting what is shown colors the map.
     painted.tactile_map_colors = REASON if len(set(painted[VALUES][REASON])) > 1 else "error"
     show_colors()
+    show_size(touched.surface.size)
     return painted
 
 
