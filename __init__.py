@@ -26,5 +26,9 @@ def reconstruction_of(obj: Any) -> "core.Reconstruction":
     Raises ValueError, with a sentence, if there is none.
     """
     from .tactile_addon.probes import probe
+    from .tactile_addon.scene import patch_record
 
-    return probe.reconstruction_of(obj)
+    patch = probe.patch_near(obj)
+    if patch is None:
+        raise ValueError("Wanted a patch or its probe, got another object or none")
+    return patch_record.reconstruction_of(patch)

@@ -18,14 +18,14 @@ from ...core.arguments import many
 from ..probes import probe, touch_again
 from ..probes.change_handlers import is_pending
 from ..probes.in_slices import InSlices, Progress
-from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, report_done, target_object
+from ..probes.operators import is_in_object_mode, is_unlocked, polls, report_done, target_object
 from ..scene import mesh_data, patch_record, shown
 from ..touch import units
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.surface import MeshSurface
 from ..touch.touch_report import TouchReport, judgment
 from ..touch.types import Object, Outcome
-from ..touch.wording import SPREAD, cell, registration_summary
+from ..touch.wording import SPREAD, cell, registration_summary, said
 
 VERTICES_AT_ONCE = 2000  # A step looks at this many vertices,
 VERIFYING = 0.8  # which takes this share of the time.
@@ -54,8 +54,6 @@ class Verification:
         self._patch, self.patch, self.target = patch.session_uid, patch.name, target.name
         self._target, self._given = target.session_uid, _inputs(patch, target)
         self._surface: MeshSurface | None = None
-        self._found: dict[str, Any] = {}
-        self._error = core.MeshError(None)
 
     def look(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Lets the steps go on in the scene as it is now. Raises ValueError if patch or mesh have changed."""
@@ -145,19 +143,16 @@ def verification_summary(record: TouchReport) -> tuple[bool, str]:
     name, vertices, percent = found["target"], found["vertices"], 100.0 * found["overlap"]
     if not (vertices or percent or found["extra_points"]):
         return True, f'Nothing of "{name}" is below the patch: move one to the other, or choose another mesh'
-    if not vertices:
-        return (
-            True,
-            f'"{name}" has no vertices over the patch to measure, only faces, over {percent:.0f} % of it',
-        )
     if record["status"] != "ok":
         return True, record["message"]
-    mean = _length(record, "vertex_distance_mean")
+    where, mean = f"At {many(vertices, 'vertex', 'vertices')}, ", _length(record, "vertex_distance_mean")
+    if not vertices:  # A coarse mesh may have only faces there.
+        where, mean = "", dict(main_rows(record))["Deviation"]
     most = _length(
         record, max("vertex_distance_max", "patch_distance_max", key=lambda key: found.get(key, 0.0))
     )
     return False, (
-        f'At {many(vertices, "vertex", "vertices")}, "{name}" is {mean} off the patch on average, and '
+        f'{where}"{name}" is {mean} off the patch on average, and '
         f"either is {most} off the other at most; the mesh covers {percent:.0f} % of the patch"
     )
 
@@ -173,25 +168,32 @@ def verification_columns(report: Mapping[str, Any]) -> list[tuple[str, Any]]:
     ]
 
 
-def verification_table(record: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    """Rows of a label and the values for the mesh and for the contacts; lengths are without unit."""
+def verification_table(record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """(label, values for the mesh and for the contacts) of each row; lengths are without unit."""
     found, symbol = record["verification"], units.symbol(1, units.unit_of_report(record))
-    rows = [(f"in {symbol}" if symbol else "Distance", "Mesh", "Contacts")]
+    rows = [(f"in {symbol}" if symbol else "Distance", "Mesh | Contacts")]
     for name, key in zip(("Mean", "Median", "Maximum", "RMS"), SPREAD, strict=True):
-        mesh, contacts = (_length(record, f"{what}_distance_{key}") for what in ("vertex", "contact"))
-        rows.append((name, mesh.removesuffix(f" {symbol}"), contacts.removesuffix(f" {symbol}")))
-    return [*rows, ("Points", str(found["vertices"]), str(found["contacts"]))]
+        lengths = (_length(record, f"{what}_distance_{key}") for what in ("vertex", "contact"))
+        rows.append((name, " | ".join(length.removesuffix(f" {symbol}") for length in lengths)))
+    return [*rows, ("Points", f"{found['vertices']} | {found['contacts']}")]
 
 
-def verification_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """(label, value) of everything else that a verification has found."""
+def main_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """(label, value) of what the sidebar shows of a verification at first."""
+    return [
+        ("Deviation", said(record, "height_error", 1) if "height_error" in record else "–"),
+        ("Largest Deviation", _length(record, "patch_distance_max")),
+        ("Overlap", f"{100.0 * record['verification']['overlap']:.0f} %"),
+    ]
+
+
+def other_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """(label, value) of everything else that it has found."""
     found = record["verification"]
     return [
         ("Fit Error", _length(record, "fit_error")),
         (f"Error on {found['extra_contours']} More Curves", _length(record, "extra_fit_error")),
         ("Total Curvature", f"{found['total_absolute_curvature']:.3g}"),
-        ("Overlap", f"{100.0 * found['overlap']:.0f} %"),
-        ("Largest Deviation", _length(record, "patch_distance_max")),
     ]
 
 
@@ -215,7 +217,7 @@ class WithMesh(InSlices):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return (
-            has_patch(cls, context, cls.hint)
+            polls(cls, probe.patch_near(context.view_layer.objects.active), cls.hint)
             and is_in_object_mode(cls, context, "Patches are compared")
             and is_unlocked(cls, context)
         )
@@ -296,8 +298,9 @@ class Search:
         try:
             self._found.set_result(core.register(*given, best=POSES))
         except MemoryError:
-            words = f'"{self.target}" is too large to be searched: remove what is far from the patch'
-            self._found.set_exception(ValueError(words))
+            self._found.set_exception(
+                ValueError(f'"{self.target}" is too large to be searched: remove what is far from the patch')
+            )
         except Exception as error:
             self._found.set_exception(error)
 
@@ -313,8 +316,10 @@ class Search:
         """
         poses = self._found.result()
         if pose > len(poses):
-            count = many(len(poses), "pose", "poses")
-            raise ValueError(f'The search has found {count} on "{self.target}": choose a lower number')
+            raise ValueError(
+                f'The search has found {many(len(poses), "pose", "poses")} on "{self.target}": choose a '
+                "lower number"
+            )
         patch: Object = bpy.data.objects.get(self.patch)
         if patch is None:
             raise ValueError(f'"{self.patch}" was deleted while its place was searched for')

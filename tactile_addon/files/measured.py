@@ -3,7 +3,7 @@
 """Measured contacts from files, as a patch or a whole surface with a report; nothing in the scene changes."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -148,22 +148,15 @@ def fit(
 
     Raises ValueError with a sentence for the user.
     """
-    if all_strokes:
-        contacts = contacts._replace(contours=[], strokes=(*contacts.contours, *contacts.strokes))
     options |= {"noise": noise or None, "radius": radius or None}
     start = perf_counter()
-    contours, unit, of_file, up, strokes = contacts
+    contours, unit, of_file, up, strokes = _chosen(contacts, normal_std, all_strokes)
     point, outward = of_file if point is None else point, up if outward is None else outward
-    if normal_std:
-        contours = [c if c.normals is None else replace(c, normal_std=normal_std) for c in contours]
     point, distances = _reference_point(contours, strokes) if point is None else (point, None)
     contours, felt = [core.in_running_order(c, point) for c in contours], [*contours, *strokes]
     reconstruct = partial(core.reconstruct, point, contours, strokes=strokes, **options)
     unknown = outward is None and not any(c.normals is not None for c in felt)
-    result = reconstruct(outward=(0.0, 0.0, 1.0) if unknown else outward)
-    bulges = (result.patch.k1 + result.patch.k2) * result.radius
-    if flip is not (unknown and bulges > FLAT):
-        result = reconstruct(outward=-result.frame.axes[:, 2])
+    result = _on_a_side(reconstruct, outward, unknown, flip)
     require_single("patch", result.radius, result.frame.origin)
     axes = reference_axes(result.frame.axes[:, 2])
     report: TouchReport = {
@@ -184,6 +177,27 @@ def fit(
         report["misses"] = distances.tolist()
     report["seconds"] = {"fit": perf_counter() - start}
     return Touched(None, result, report)
+
+
+def _chosen(contacts: core.Contacts, normal_std: float, all_strokes: bool) -> core.Contacts:
+    """The contacts of a fit, see there."""
+    contours, strokes = contacts.contours, contacts.strokes
+    if all_strokes:
+        contours, strokes = [], (*contours, *strokes)
+    if normal_std:
+        contours = [c if c.normals is None else replace(c, normal_std=normal_std) for c in contours]
+    return contacts._replace(contours=contours, strokes=strokes)
+
+
+def _on_a_side(
+    reconstruct: Callable[..., core.Reconstruction], outward: Point | None, unknown: bool, flip: bool
+) -> core.Reconstruction:
+    """The patch seen from `outward`, or, where the outer side is unknown, from where it bulges to."""
+    result = reconstruct(outward=(0.0, 0.0, 1.0) if unknown else outward)
+    bulges = (result.patch.k1 + result.patch.k2) * result.radius
+    if flip is not (unknown and bulges > FLAT):
+        result = reconstruct(outward=-result.frame.axes[:, 2])
+    return result
 
 
 def _reference_point(

@@ -18,7 +18,7 @@ from bpy.app.handlers import persistent
 from ..scene import undo
 from ..scene.family import remembered
 from ..scene.viewports import has_gesture
-from ..touch.settings import is_silent
+from ..touch.settings import silent
 from ..touch.types import Object
 from . import anchor, deleted
 from .probe import is_probe, lock_of, probe_of, record_of, targets
@@ -46,7 +46,7 @@ def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> N
 
 def _bring_up_to_date(depsgraph: bpy.types.Depsgraph, dearest: float) -> None:
     """Touches again if the last touch took at most `dearest` seconds; other patches say "outdated"."""
-    if is_silent() or not targets() or depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
+    if silent.is_on or not targets() or depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
         return
     with remembered(), undo.after_step():
         concerned, unsure = _concerned(depsgraph)

@@ -46,8 +46,8 @@ def _follow(probe: Object, target: Object) -> None:
     Its override may be in a scene, or it may be in one of its own file. The override takes the place of the
     object, unless it was made only because the probe refers to the object.
     """
-    alike = (obj for obj in bpy.data.objects if obj.users_scene and _source(obj) == _source(target))
-    found = next(alike, None)
+    source = _source(target)
+    found = next((obj for obj in bpy.data.objects if obj.users_scene and _source(obj) == source), None)
     if found is None:
         return
     was_attached = anchor.is_attached(probe)

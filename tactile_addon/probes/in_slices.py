@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 import bpy
 from bpy.props import BoolProperty
 
+from ..scene.viewports import redraw
 from ..touch.settings import TARGET, UNSAVED, draw_chosen
 from ..touch.types import Object, OperatorMixin, Outcome
 from ..touch.units import duration
@@ -103,7 +104,7 @@ class InSlices(OperatorMixin):
         try:
             if not self._advance(context, self._slice()):
                 context.workspace.status_text_set(_draw_status)  # This has it drawn again.
-                redraw_sidebars(context)
+                redraw(context, "UI")
                 return self.meanwhile
             self._leave(context)
             return self._finish(context)
@@ -157,7 +158,7 @@ class InSlices(OperatorMixin):
         """Removes everything that shows that it is going on."""
         if self._timer is not None:
             _running.remove(self)
-            redraw_sidebars(context)
+            redraw(context, "UI")
             context.window_manager.event_timer_remove(self._timer)
             context.workspace.status_text_set(None)
             self._timer = None
@@ -202,14 +203,6 @@ def _draw_status(header: Any, context: bpy.types.Context) -> None:
     row = header.layout.row()
     row.ui_units_x = 30
     draw_running(row)
-
-
-def redraw_sidebars(context: bpy.types.Context) -> None:
-    """Has the sidebars of all viewports in the window drawn again; there is none while that is closed."""
-    for area in context.window.screen.areas if context.window else ():
-        for region in area.regions if area.type == "VIEW_3D" else ():
-            if region.type == "UI":
-                region.tag_redraw()
 
 
 class AllOver(InSlices):

@@ -14,7 +14,7 @@ from ..touch.settings import UNSAVED, PlacedTouch, draw_all, given, length_prope
 from ..touch.touch_object import completed, touch
 from ..touch.types import Object, Outcome
 from ..touch.wording import fit_summary, sentence
-from .probe import is_result, lock_of, patch_near, probe_of, record_of
+from .probe import is_result, lock_of, probe_of, record_of
 
 CONVERTIBLE = {"FONT": "text", "CURVE": "curve", "SURFACE": "surface", "META": "metaball"}
 
@@ -142,8 +142,8 @@ def is_in_object_mode(operator: type[Any], context: bpy.types.Context, what: str
 
 def has_mesh(operator: type[Any], context: bpy.types.Context) -> bool:
     """Whether the view layer has a mesh that can be touched; if not, the operator's poll says so."""
-    meshes = (obj for obj in context.view_layer.objects if obj.type == "MESH" and not is_result(obj))
-    return polls(operator, any(meshes), no_mesh(context))
+    found = any(obj.type == "MESH" and not is_result(obj) for obj in context.view_layer.objects)
+    return polls(operator, found, no_mesh(context))
 
 
 def no_mesh(context: bpy.types.Context) -> str:
@@ -163,11 +163,6 @@ def has_target(operator: type[Any], context: bpy.types.Context) -> bool:
     except ValueError as error:
         return has_mesh(operator, context) and polls(operator, False, sentence(error))
     return polls(operator, obj.type == "MESH", "Select the mesh object to touch")
-
-
-def has_patch(operator: type[Any], context: bpy.types.Context, hint: str) -> bool:
-    """Whether the active object is a patch or its probe; if not, the poll gives a hint."""
-    return polls(operator, patch_near(context.view_layer.objects.active), hint)
 
 
 def is_unlocked(operator: type[Any], context: bpy.types.Context) -> bool:

@@ -39,10 +39,9 @@ from bpy.props import (
     StringProperty,
 )
 
-from ... import core
 from ..scene import patch_object, patch_record, shown
-from ..scene.family import all_objects, children_of
-from ..touch.settings import OVERRIDABLE, TouchSettings, changed, is_silent
+from ..scene.family import children_of
+from ..touch.settings import OVERRIDABLE, TouchSettings, changed, silent
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object
 from . import anchor
@@ -102,7 +101,8 @@ def targets() -> set[int]:
 
     Its cache is cleared when probes may have come or gone or changed their targets.
     """
-    of = (obj.tactile_probe.target for obj in all_objects() if is_probe(obj))
+    probes: list[Object] = [obj for obj in bpy.data.objects if is_probe(obj)]
+    of = (probe.tactile_probe.target for probe in probes)
     return {0 if target is None else target.session_uid for target in of}
 
 
@@ -113,7 +113,7 @@ def _appointed(settings: TactileProbe, context: bpy.types.Context) -> None:
 
 def _chosen(settings: TactileProbe, context: bpy.types.Context) -> None:
     """Makes a probe that was a child of its target a child of the new target."""
-    if is_silent():  # It is the same target, which has come back or is an override now.
+    if silent.is_on:  # It is the same target, which has come back or is an override now.
         targets.cache_clear()
         return
     settings.lost, probe, record = "", settings.id_data, record_of(settings.id_data)
@@ -134,8 +134,7 @@ def is_probe(obj: Object) -> bool:
 
 def is_result(obj: Object) -> bool:
     """Whether an object is a patch, a stability map or a whole object."""
-    keys = patch_record.RECORD, patch_record.MAP_RECORD, patch_record.ATLAS_RECORD
-    return any(key in obj for key in keys)
+    return patch_record.RECORD in obj or patch_record.touched_record(obj) is not None
 
 
 def patch_of(probe: Object) -> Object | None:
@@ -153,14 +152,6 @@ def patch_near(obj: Object) -> Object | None:
     if is_probe(obj):
         return patch_of(obj)
     return obj if obj is not None and _is_patch(obj) else None
-
-
-def reconstruction_of(obj: Object) -> core.Reconstruction:
-    """The core.Reconstruction of the patch near `obj`, where it is now. Raises ValueError without one."""
-    patch = patch_near(obj)
-    if patch is None:
-        raise ValueError("Wanted a patch or its probe, got another object or none")
-    return patch_record.reconstruction_of(patch)
 
 
 def probe_of(obj: Object) -> Object | None:
@@ -220,7 +211,8 @@ PROPERTIES = {
     ),
     "tactile_directions": BoolProperty(
         name="Directions",
-        description="Show the principal directions, along which the surface bends by κ1 and κ2",
+        description="Show the principal directions, along which the surface bends by κ1 and κ2; where these "
+        "are equal, there are none",
         override=OVERRIDABLE,
     ),
     "tactile_target": StringProperty(  # A pointer would keep a deleted mesh.

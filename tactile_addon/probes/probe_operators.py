@@ -91,16 +91,11 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
         found = probe.probe_of(context.view_layer.objects.active)
         depsgraph = context.evaluated_depsgraph_get()
         touched = touch_again.touch_at(found, depsgraph, complete=True, tolerance=self.tolerance)
-        settings = found.tactile_probe
         with silent():
             for plane in touched.report["added_planes"]:
-                _add(settings, plane)
+                _add(found.tactile_probe, plane)
             touch_again.adopt(found, touched, depsgraph, complete=True)
         return report_done(self, added_planes(touched.report))
-
-    def draw(self, context: bpy.types.Context) -> None:
-        self.layout.use_property_split = True
-        self.layout.prop(self, "tolerance")
 
 
 def _add(settings: Any, suggested: Mapping[str, Any] | None) -> None:

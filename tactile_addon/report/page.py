@@ -108,9 +108,9 @@ def histogram(values: Array, weights: Array, limit: float, label: Callable[[floa
 
 def scale(limit: float, label: Callable[[float], str], low: float = -1.0) -> str:
     """A picture of the colors from `low` times the limit to the limit, with their values."""
-    fills = shades(np.linspace(low, 1.0, 64), 1.0)
     boxes = [
-        f'<rect x="{5 * i}" y="0" width="5.5" height="12" fill="{_hex(f)}"/>' for i, f in enumerate(fills)
+        f'<rect x="{5 * i}" y="0" width="5.5" height="12" fill="{_hex(fill)}"/>'
+        for i, fill in enumerate(shades(np.linspace(low, 1.0, 64), 1.0))
     ]
     words = [
         f'<text x="{x}" y="27" text-anchor="{anchor}">{label(at * limit)}</text>'

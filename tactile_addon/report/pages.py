@@ -170,8 +170,7 @@ class TACTILE_OT_export_report(ObjectExport, bpy.types.Operator):
     @staticmethod
     def written(context: bpy.types.Context) -> Any:
         obj: Object = context.view_layer.objects.active
-        records = (patch_record.MAP_RECORD, patch_record.ATLAS_RECORD)
-        return obj if obj is not None and any(key in obj for key in records) else probe.patch_near(obj)
+        return probe.patch_near(obj) if patch_record.touched_record(obj) is None else obj
 
     def write(self, obj: Object) -> None:
         write(self.filepath, obj)

@@ -29,7 +29,6 @@ CHOSEN = ("spacing", "extent", "step")  # Of these lengths, 0 has the surface ch
 LENGTHS = (*CHOSEN, "tolerance", "noise")
 DARKEST = 0.45  # Where the surface turns away, it is this bright.
 CELLS = 64  # Vertices in one of so many cells along the longest side are drawn as one: a picture is small.
-# Words, the axes to the right and up, the axis of sight and its sign toward the viewer.
 MANIFEST = Path(__file__).resolve().parents[2] / "blender_manifest.toml"
 # Words, the axes to the right and up, the axis of sight and its sign toward the viewer.
 VIEWS = (

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All objects of the file, and the children of each.
+"""The children of objects.
 
 Blender looks through all objects for the children of one; this looks once for many.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import bpy
@@ -14,11 +14,6 @@ from ..touch.types import Object
 
 # Within `remembered`, the children by their parents; empty until it is needed.
 _remembered: dict[Object, list[Object]] | None = None
-
-
-def all_objects() -> Iterable[Object]:
-    """All objects of the file, with the custom properties that Blender's stubs do not know."""
-    return bpy.data.objects
 
 
 def children_of(obj: Object) -> list[Object]:

@@ -44,7 +44,7 @@ POWERS = {name: power for name, _, _, power in QUANTITIES}
 QUANTITIES_OF_A_FIT = (*CURVATURES, HEIGHT_STD)  # These need no mesh to compare with.
 POSITIVE = ("curvedness", HEIGHT_STD)  # These are never below zero, so they need half a scale.
 # By name, lists of curves with three coordinates a point, in the Darboux frame: contours, strokes (the
-# contacts beside these), rim, and directions (d1 and d2).
+# contacts beside these), rim, and directions (d1 and d2, where the curvatures differ).
 Curves: TypeAlias = dict[str, list[list[float]]]
 RIM_CORNERS = 96  # The number of points of the rim.
 ALONG, POINTS = 0.4, 9  # How far a principal direction is drawn, as a share of the radius, and its points.
@@ -101,7 +101,7 @@ def require_colored(obj: Object) -> None:
 
 def touched_record(obj: Object | None) -> Any:
     """The report of a stability map or a whole object, or None for any other object."""
-    return None if obj is None else obj.get(MAP_RECORD) or obj.get(ATLAS_RECORD)
+    return None if obj is None else obj.get(MAP_RECORD, obj.get(ATLAS_RECORD))
 
 
 def _is_whole(obj: Object) -> bool:
@@ -218,7 +218,8 @@ def curves_of(result: core.Reconstruction) -> Curves:
     edge = result.domain.boundary(RIM_CORNERS)
     along, across = np.linspace(-ALONG, ALONG, POINTS) * result.radius, np.zeros(POINTS)
     plane = {"rim": [np.vstack([edge, edge[:1]])]}
-    plane["directions"] = [np.column_stack(pair) for pair in ((along, across), (across, along))]
+    if not result.posterior.is_round:
+        plane["directions"] = [np.column_stack(pair) for pair in ((along, across), (across, along))]
     found: dict[str, list[Array]] = {
         name: [np.column_stack([at, result.height(*at.T)]) for at in paths] for name, paths in plane.items()
     }

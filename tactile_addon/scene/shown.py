@@ -21,7 +21,6 @@ from ..touch import units
 from ..touch.evaluated_mesh import read_array
 from ..touch.types import Array, Object
 from . import colors
-from .family import all_objects
 from .mesh_data import COLOR, CURVATURE_STD, CURVATURES, POSITION, own_mesh, values
 from .patch_record import ATLAS_RECORD, COMMON_RANGE, POWERS, RANGE, RECORD, is_colored, report_of
 
@@ -104,7 +103,8 @@ def _corners_shown(mesh: bpy.types.Mesh, shown: str, edge: float) -> Array:
 
 def share(patch: Object) -> None:
     """Gives all patches of the mesh of a patch the range that suits all of them."""
-    patches = [obj for obj in all_objects() if RECORD in obj and obj.is_editable and is_colored(obj)]
+    objects: list[Object] = list(bpy.data.objects)
+    patches = [obj for obj in objects if RECORD in obj and obj.is_editable and is_colored(obj)]
     source = patch[RECORD]["source"]
     patches = [obj for obj in patches if obj[RECORD]["source"] == source and obj.data.users == 1]
     common = _bend(obj[RECORD] for obj in patches)

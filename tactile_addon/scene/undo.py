@@ -7,16 +7,16 @@ that it goes to. A collection that holds a patch made by a handler would then po
 that was added is unlinked before undo, and linked again afterward if it is still there.
 """
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
 
 from ..touch.types import Object
+from ..touch.within import Within
 
-_is_late = False
+after_step = Within()  # Within this context, what is added may be in no undo step.
 _added: set[int] = set()  # The session_uids of objects and collections that were added.
 # The session_uids of meshes, by those of the copies that have taken their places.
 _replaced: dict[int, int] = {}
@@ -24,26 +24,15 @@ _replaced: dict[int, int] = {}
 _links: list[tuple[Any, ...]] = []
 
 
-@contextmanager
-def after_step() -> Iterator[None]:
-    """Within this context, what is added may be in no undo step."""
-    global _is_late
-    outer, _is_late = _is_late, True
-    try:
-        yield
-    finally:
-        _is_late = outer
-
-
 def note_added(datablock: Object | bpy.types.Collection) -> None:
     """Notes a new object or collection that is linked to something that was there before."""
-    if _is_late:
+    if after_step.is_on:
         _added.add(datablock.session_uid)
 
 
 def note_copied(obj: Object, mesh: bpy.types.Mesh) -> None:
     """Notes an object that got a copy of `mesh` instead of it."""
-    if _is_late:
+    if after_step.is_on:
         _replaced[obj.data.session_uid] = mesh.session_uid
 
 
@@ -105,5 +94,7 @@ def _link(block: Object | bpy.types.Collection, above: bpy.types.Collection) -> 
 
 def _collections() -> dict[int, bpy.types.Collection]:
     """All collections by their session_uids, and the scenes' own collections by those of the scenes."""
-    found = {collection.session_uid: collection for collection in bpy.data.collections}
-    return found | {scene.session_uid: scene.collection for scene in bpy.data.scenes}
+    return {
+        **{collection.session_uid: collection for collection in bpy.data.collections},
+        **{scene.session_uid: scene.collection for scene in bpy.data.scenes},
+    }

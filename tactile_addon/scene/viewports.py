@@ -8,9 +8,9 @@ from typing import Any
 import bpy
 
 NEAREST, FARTHEST = 0.02, 20.0  # The distances, in sizes of an object, between which it is shown.
-# If a view is clipped nearer than at this share of the size, which Blender itself does not do below 1 cm, its
-# depths are so coarse that a patch and the mesh run through each other.
-COARSE, OWN = 5e-4, 0.01
+# If a view is clipped nearer than at this share of the size, as Blender itself does from 20 m on, its depths
+# are so coarse that a patch or a map and the mesh run through each other.
+COARSE = 5e-4
 GESTURES = ("TRANSFORM_OT_", "TACTILE_OT_")
 
 
@@ -22,15 +22,22 @@ def shows_colors(space: Any) -> bool:
 
 def has_gesture() -> bool:
     """Whether something is being dragged in any window, which then keeps pointers to it."""
-    windows = bpy.context.window_manager.windows
-    names = [operator.bl_idname for window in windows for operator in window.modal_operators]
-    return any(name.startswith(GESTURES) or "_move" in name for name in names)
+    running = [each for window in bpy.context.window_manager.windows for each in window.modal_operators]
+    return any(each.bl_idname.startswith(GESTURES) or "_move" in each.bl_idname for each in running)
 
 
 def _viewports() -> Iterator[Any]:
     """The spaces of all 3D viewports. A file made without a window has some, too, in which it is opened."""
-    areas = (area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D")
-    return (area.spaces.active for area in areas)
+    for screen in bpy.data.screens:
+        yield from (area.spaces.active for area in screen.areas if area.type == "VIEW_3D")
+
+
+def redraw(context: bpy.types.Context, kind: str) -> None:
+    """Has the regions of a kind drawn again in all viewports of the window; none while that is closed."""
+    for area in context.window.screen.areas if context.window else ():
+        for region in area.regions if area.type == "VIEW_3D" else ():
+            if region.type == kind:
+                region.tag_redraw()
 
 
 def show_colors(chosen: Any = None) -> None:
@@ -45,5 +52,5 @@ def show_colors(chosen: Any = None) -> None:
 def show_size(size: float) -> None:
     """Makes all viewports show an object of this size from near by and from afar, if they do not yet."""
     for space in _viewports() if size > 0.0 else ():
-        space.clip_start = min(max(space.clip_start, min(COARSE * size, OWN)), NEAREST * size)
+        space.clip_start = min(max(space.clip_start, COARSE * size), NEAREST * size)
         space.clip_end = max(space.clip_end, FARTHEST * size)

@@ -9,15 +9,14 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface
 
 from ... import core
-from ..comparison.operators import verification_rows, verification_table
+from ..comparison import operators as comparison
 from ..probes import probe
 from ..probes.in_slices import draw_running
 from ..probes.operators import no_mesh
 from ..scene import patch_record
 from ..scene.shown import unit_of_range
 from ..scene.viewports import shows_colors
-from ..stability_map.map_object import facets as map_facets
-from ..stability_map.map_object import map_rows, median_rows
+from ..stability_map.map_object import map_facets, map_rows, median_rows
 from ..touch import units
 from ..touch.settings import draw_chosen, draw_fit, draw_noise
 from ..touch.touch_report import TouchReport
@@ -159,10 +158,13 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
             layout.operator("tactile.update", icon="FILE_REFRESH")
         elif found is not None and any(core.SUBDIVIDE in doubt["advice"] for doubt in record["doubts"]):
             layout.operator("tactile.add_subdivision", icon="MOD_SUBSURF")
+        _draw_comparison(context, layout, record)
         if body := _folded(layout, "more", "More"):
             _draw_more(context, body, patch, record)
-        if found is None or "verification" in record or "registration" in record:
-            _draw_comparison(context, layout, patch, record)
+        if found is None:
+            layout.prop_search(patch, "tactile_target", context.scene, "objects")
+            layout.operator("tactile.register", icon="SNAP_ON")
+            layout.operator("tactile.verify", icon="VIEWZOOM")
 
 
 class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
@@ -247,6 +249,9 @@ def _draw_more(
         draw_rows(context, layout, rows, active=is_current)
     if probe.probe_of(patch) is not None:
         layout.operator("tactile.verify", icon="VIEWZOOM")
+    if "verification" in record:
+        for rows in (comparison.verification_table(record), comparison.other_rows(record)):
+            draw_rows(context, layout, rows, active=is_current)
 
 
 def _draw_colors(context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object, name: str) -> None:
@@ -274,28 +279,20 @@ def _draw_shown(layout: bpy.types.UILayout, found: Object | None, patch: Object)
     row = layout.row(align=True)
     row.use_property_split = False
     row.prop(patch, "tactile_contours", icon="CURVE_DATA", toggle=1)
-    row.prop(patch, "tactile_directions", icon="EMPTY_AXIS", toggle=1)
+    directions = row.row(align=True)
+    directions.active = "directions" in patch.get(patch_record.CURVES, ())
+    directions.prop(patch, "tactile_directions", icon="EMPTY_AXIS", toggle=1)
     if found is not None:
         row.prop(found.tactile_probe, "show_handles", icon="GIZMO", toggle=1)
 
 
-def _draw_comparison(
-    context: bpy.types.Context, layout: bpy.types.UILayout, patch: Object, record: TouchReport
-) -> None:
+def _draw_comparison(context: bpy.types.Context, layout: bpy.types.UILayout, record: TouchReport) -> None:
     """Draws where the patch was put on a mesh, and how far it is off one, if these are known."""
-    if probe.probe_of(patch) is None:
-        layout.prop_search(patch, "tactile_target", context.scene, "objects")
-        layout.operator("tactile.register", icon="SNAP_ON")
-        layout.operator("tactile.verify", icon="VIEWZOOM")
     if "registration" in record:
         draw_sentence(context, layout, registration_summary(record), "SNAP_ON")
-    if "verification" not in record:
-        return
-    layout = layout.column()
-    layout.active = record["status"] != "outdated"
-    layout.label(text=record["verification"]["target"], icon="MESH_DATA", translate=False)
-    for rows in (verification_table(record), verification_rows(record)):
-        draw_rows(context, layout, [(label, " | ".join(values)) for label, *values in rows])
+    if "verification" in record:
+        layout.label(text=record["verification"]["target"], icon="MESH_DATA", translate=False)
+        draw_rows(context, layout, comparison.main_rows(record), active=record["status"] != "outdated")
 
 
 PANELS = (TACTILE_PT_probe, TACTILE_PT_result, TACTILE_PT_object, TACTILE_PT_map, TACTILE_PT_probes)

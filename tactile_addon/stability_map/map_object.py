@@ -29,7 +29,7 @@ from ..scene.mesh_data import (
     write,
 )
 from ..scene.shown import LEAST_LENGTH
-from ..scene.viewports import show_colors
+from ..scene.viewports import show_colors, show_size
 from ..touch import units
 from ..touch.evaluated_mesh import read_array
 from ..touch.settings import MOST_PLANES, NAMES, TouchSettings, length_property, touch_arguments
@@ -99,6 +99,7 @@ def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Ob
     # Where one reason holds everywhere, its color shows nothing; setting what is shown colors the map.
     painted.tactile_map_colors = REASON if len(set(painted[VALUES][REASON])) > 1 else "error"
     show_colors()
+    show_size(touched.surface.size)
     return painted
 
 
@@ -156,8 +157,11 @@ def swatches(painted: Object) -> list[tuple[str, tuple[float, ...]]]:
     if painted.tactile_map_colors != REASON:
         refused = sum(counts[key] for key in REASON_KEYS[2:])
         return [(f"No Patch: {refused}", REFUSED)] if refused else []
-    names = zip(REASONS, REASON_COLORS, strict=True)
-    return [(f"{name}: {counts[key]}", tuple(c)) for (key, name, _), c in names if counts[key]]
+    return [
+        (f"{name}: {counts[key]}", tuple(color))
+        for (key, name, _), color in zip(REASONS, REASON_COLORS, strict=True)
+        if counts[key]
+    ]
 
 
 def touched_near(painted: Object, location: list[float]) -> list[float]:
@@ -242,7 +246,7 @@ def map_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     ]
 
 
-def facets(record: Mapping[str, Any]) -> str | None:
+def map_facets(record: Mapping[str, Any]) -> str | None:
     """A sentence if half of the patches or more follow facets, as the verdict on a patch has it; or None."""
     count = record.get("few_facets", 0)
     if count < max(FACETED * record["patches"], 1):

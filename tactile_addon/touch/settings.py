@@ -3,16 +3,15 @@
 """The settings of a touch, which operators and probes have in common."""
 
 import math
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
-from bpy.types import Object
 
 from ... import core
+from .within import Within
 
 METHODS = [
     (
@@ -48,23 +47,7 @@ AUTO = {  # These are literals, so that they can be translated.
 MOST_PLANES = 6
 STEEPEST = math.radians(60)  # The mouse tilts planes by no more.
 OVERRIDABLE: set[Any] = {"LIBRARY_OVERRIDABLE"}  # The override of a library's probe keeps these as its own.
-_is_silent = False  # Whether settings change within `silent`.
-
-
-@contextmanager
-def silent() -> Iterator[None]:
-    """Within this context, no handler looks at what changes: the caller touches again."""
-    global _is_silent
-    outer, _is_silent = _is_silent, True
-    try:
-        yield
-    finally:
-        _is_silent = outer
-
-
-def is_silent() -> bool:
-    """Whether settings change within `silent`."""
-    return _is_silent
+silent = Within()  # Within this context, no handler looks at what changes: the caller touches again.
 
 
 def changed(settings: Any, context: bpy.types.Context) -> None:
@@ -72,7 +55,7 @@ def changed(settings: Any, context: bpy.types.Context) -> None:
 
     Blender calls this when a property with it as `update` changes; operators' settings are passed over.
     """
-    if not _is_silent and isinstance(settings.id_data, Object) and settings.is_probe:
+    if not silent.is_on and isinstance(settings.id_data, bpy.types.Object) and settings.is_probe:
         settings.id_data.update_tag()
         context.view_layer.update()
 

@@ -19,7 +19,7 @@ from gpu_extras.batch import batch_for_shader
 from ..scene.mesh_data import ABOVE
 from ..scene.patch_record import RECORD
 from ..touch.evaluated_mesh import read_array
-from ..touch.types import Array, Object
+from ..touch.types import Object
 from .curves import coordinates
 
 DARKEST, BRIGHTEST = 0.3, 0.7  # The share of its color that a face has edge on, and upright, as in Solid.
@@ -83,20 +83,14 @@ def _batch(obj: Object) -> gpu.types.GPUBatch:
     key = hash(points.tobytes()), hash(colors.tobytes())
     known = _batches.get(obj.session_uid)
     if known is None or known[0] != key:
-        if color.domain == "POINT":
-            colors = colors[read_array(mesh.loops, "vertex_index", dtype=np.int32)]
-        _batches[obj.session_uid] = key, _new_batch(mesh, points, colors)
+        mesh.calc_loop_triangles()
+        loops = read_array(mesh.loop_triangles, "loops", 3, dtype=np.int32).ravel()
+        corners = read_array(mesh.loop_triangles, "vertices", 3, dtype=np.int32).ravel()
+        facing = read_array(mesh.corner_normals, "vector", 3)[loops]
+        tints = colors[corners if color.domain == "POINT" else loops]
+        columns: dict[str, Any] = {"pos": points[corners], "normal": facing, "color": tints}
+        _batches[obj.session_uid] = key, batch_for_shader(_shader(), "TRIS", columns)
     return _batches[obj.session_uid][1]
-
-
-def _new_batch(mesh: bpy.types.Mesh, points: Array, colors: Array) -> gpu.types.GPUBatch:
-    """The triangles of a mesh with points (n, 3) and colors (k, 4) of corners."""
-    mesh.calc_loop_triangles()
-    loops = read_array(mesh.loop_triangles, "loops", 3, dtype=np.int32).ravel()
-    corners = read_array(mesh.loop_triangles, "vertices", 3, dtype=np.int32).ravel()
-    facing = read_array(mesh.corner_normals, "vector", 3)
-    columns: dict[str, Any] = {"pos": points[corners], "normal": facing[loops], "color": colors[loops]}
-    return batch_for_shader(_shader(), "TRIS", columns)
 
 
 @lru_cache(maxsize=1)

@@ -29,6 +29,7 @@ PLANE_COLORS = [
 WHITE, BLACK, DARK = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.6)
 WIDTH, OUTLINE = 1.5, 0.75  # Of a curve, and of the dark line on either side of it, in pixels at scale 1.
 SOLID = "SOLID", "WIREFRAME"  # Kinds of shading without materials.
+LINES = "POLYLINE_SMOOTH_COLOR"  # Blender's own shader of them.
 STROKE = 3.0  # The size of a contact of a stroke.
 NEARER = 0.002  # Where curves may be hidden, they are drawn nearer by this share of their distance.
 FONT, LETTER = 0, 12.0  # Blender's own font; the size of the letters of principal directions.
@@ -89,7 +90,7 @@ def draw(curves: Curves, rim: tuple[float, ...], has_contours: bool, has_directi
         pairs = zip(curves["contours"], cycle(PLANE_COLORS), strict=False)
         lines += [(path, (*color, 1.0)) for path, color in pairs]
     if has_directions:
-        lines += [(path, BLACK) for path in curves["directions"]]
+        lines += [(path, BLACK) for path in curves.get("directions", ())]
     draw_lines(lines)
     gpu.state.point_size_set(STROKE * scale)
     for path in curves.get("strokes", ()) if has_contours else ():
@@ -99,7 +100,7 @@ def draw(curves: Curves, rim: tuple[float, ...], has_contours: bool, has_directi
 def draw_lines(lines: Sequence[tuple[Sequence[float], tuple[float, ...]]]) -> None:
     """Draws lines, each of which has numbers, three a point, and a color."""
     scale = bpy.context.preferences.system.ui_scale
-    shader = _shader()
+    shader = gpu.shader.from_builtin(LINES)
     drawn = tuple((np.array(path, dtype=float).tobytes(), color) for path, color in lines)
     gpu.state.blend_set("ALPHA")
     for is_outline, width in ((True, WIDTH + 2.0 * OUTLINE), (False, WIDTH)):
@@ -109,16 +110,16 @@ def draw_lines(lines: Sequence[tuple[Sequence[float], tuple[float, ...]]]) -> No
     gpu.state.blend_set("NONE")
 
 
-def _shader() -> gpu.types.GPUShader:
-    return gpu.shader.from_builtin("POLYLINE_SMOOTH_COLOR")
-
-
 @lru_cache(maxsize=512)  # A redraw of hundreds of patches would take too long otherwise.
 def _batch(lines: tuple[tuple[bytes, tuple[float, ...]], ...], is_outline: bool) -> gpu.types.GPUBatch:
     """The segments of lines, in their colors or dark."""
     pieces = [np.repeat(np.frombuffer(raw).reshape(-1, 3), 2, axis=0)[1:-1] for raw, _ in lines]
     shades = np.repeat([DARK if is_outline else color for _, color in lines], list(map(len, pieces)), axis=0)
-    return batch_for_shader(_shader(), "LINES", {"pos": np.vstack(pieces).tolist(), "color": shades.tolist()})
+    return batch_for_shader(
+        gpu.shader.from_builtin(LINES),
+        "LINES",
+        {"pos": np.vstack(pieces).tolist(), "color": shades.tolist()},
+    )
 
 
 def draw_shape(kind: Any, shader_name: str, columns: dict[str, Any], **uniform: Any) -> None:
@@ -135,12 +136,13 @@ def draw_letters() -> None:
     """Writes which principal curvature is that along a direction, at its end."""
     context = bpy.context
     scale = context.preferences.system.ui_scale
-    for obj in _shown_patches(context):
+    shown = [o for o in _shown_patches(context) if o.tactile_directions and "directions" in o[CURVES]]
+    for obj in shown:
         ends = [obj.matrix_world @ Vector(path[-3:]) for path in obj[CURVES]["directions"]]
         places = [location_3d_to_region_2d(context.region, context.region_data, end) for end in ends]
         is_clear = None not in places and (places[0] - places[1]).length > APART * LETTER * scale
         for at, text in zip(places, ("κ1", "κ2"), strict=True):
-            if obj.tactile_directions and is_clear:
+            if is_clear:
                 blf.size(FONT, LETTER * scale)
                 blf.color(FONT, *WHITE)
                 blf.position(FONT, at.x + 4.0 * scale, at.y, 0.0)

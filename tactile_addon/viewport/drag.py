@@ -194,7 +194,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
         if self.what == POINT:
             words = "Point on " + probe.probe_of(context.object).tactile_probe.target.name
         elif self.what == DRAG_EXTENT:
-            words = f"Extent {units.length(self._value)}"
+            words = f"Extent {units.say_of(probe.record_of(context.object), self._value)}"
         else:
             angle = "Azimuth" if self.what == DRAG_TURN else "Tilt"
             words = f"{angle} {self.plane + 1}: {math.degrees(self._value):.1f}°"

@@ -18,7 +18,7 @@ from ..probes.operators import (
     target_object,
 )
 from ..scene import patch_record
-from ..scene.viewports import show_colors, show_size
+from ..scene.viewports import redraw, show_colors, show_size
 from ..stability_map.map_object import inputs_of, touched_near
 from ..touch.settings import (
     NAMES,
@@ -129,7 +129,7 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         context.window.cursor_modal_restore()
         context.workspace.status_text_set(None)
         self._area.header_text_set(None)
-        _redraw(context)
+        redraw(context, "WINDOW")
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> Outcome:
@@ -217,14 +217,8 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
             words = self._seen["refusal"] = sentence(error)
             short = "No touch is possible here"
         self._area.header_text_set(f"Pick Reference Point     {short}")
-        _redraw(context)
+        redraw(context, "WINDOW")
         return words
-
-
-def _redraw(context: bpy.types.Context) -> None:
-    for area in context.screen.areas:
-        if area.type == "VIEW_3D":
-            area.tag_redraw()
 
 
 class TactileTool(bpy.types.WorkSpaceTool):

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Touch All Over: touches that grow over an object by themselves; and the buttons of their surface."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from time import perf_counter
 from typing import Any
 
@@ -25,7 +25,6 @@ from ..probes.operators import (
     surface_of,
     target_object,
 )
-from ..probes.probe_operators import TACTILE_OT_add_subdivision
 from ..scene import patch_record
 from ..scene.mesh_data import DEVIATION, own_mesh, values
 from ..touch import units
@@ -34,7 +33,7 @@ from ..touch.evaluated_mesh import read_array
 from ..touch.settings import NOISE, UNSAVED, given, length_property
 from ..touch.types import Object, Outcome, Point
 from . import whole_mesh
-from .both_ways import THIN_SHARE
+from .both_ways import DIRECTIONS, LIFT, THIN_SHARE
 from .object_report import FACETED, deviation, object_summary
 from .object_touches import ObjectTouches, tolerance_of
 
@@ -99,8 +98,8 @@ class Growing(WithTouches):
         shown = 0
         for _ in self._touches.steps():
             if self._growing is not None:
-                self._growing.add(self._touches.found[shown:], self._touches.rims[shown:])
-            shown = len(self._touches.found)
+                self._growing.add(self._touches.explored[shown:], self._touches.rims[shown:])
+            shown = len(self._touches.explored)
             yield
 
     def _check(self, context: bpy.types.Context) -> None:
@@ -108,7 +107,7 @@ class Growing(WithTouches):
 
     def _stopped(self, context: bpy.types.Context) -> Outcome:
         """Has the patches so far joined. If Esc is pressed again, nothing is kept."""
-        if self._is_ending or not self._touches.found:
+        if self._is_ending or not self._touches.explored:
             return super()._stopped(context)
         self._is_ending, self.stop = True, "Discard the Surface"
         self._touches.is_stopped = True
@@ -183,9 +182,8 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
     edge: EDGE
 
     shown = ("target", "accuracy", "tolerance", "edge", "noise")
-    _mesh: DetachedMesh
-    _shape: tuple[int, int] | None = None  # What it is of: the object and the number of its vertices.
-    _warnings: list[str]
+    _shape: tuple[int, int] | None = None  # What is in `_mesh`: the object and the number of its vertices.
+    _warnings: Sequence[str] = ()
     _is_faceted = False  # Whether touches would feel the facets of the object one by one.
 
     def _begin(self, context: bpy.types.Context) -> None:
@@ -221,19 +219,19 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
         tolerance = self.tolerance or tolerance_of(self._mesh.size, self.accuracy, self.noise)
         touches, seconds, share, wall = expected(self._mesh, tolerance, self.noise)
         self._is_faceted = share >= FACETED
-        self._warnings = ["Touches will feel its facets one by one"] * self._is_faceted
+        warnings = ["Touches will feel its facets one by one"] * self._is_faceted
         if wall < THIN_SHARE:
-            self._warnings.append(f"Walls of {100.0 * wall:.2g} % of its size may be bridged or pierced")
+            warnings.append(f"Walls of {100.0 * wall:.2g} % of its size may be bridged or pierced")
+        self._warnings = warnings
         words = units.say_of({"size": self._mesh.size}, tolerance)  # in the unit that the panel has
         return f"Tolerance {words}: about {many(touches, 'touch', 'touches')}, {units.duration(seconds)}"
 
     def draw(self, context: bpy.types.Context) -> None:
         super().draw(context)
-        for warning in self._warnings if self._shape else ():
+        for warning in self._warnings:
             self.layout.label(text=warning, icon="ERROR")
         if self._is_faceted:
-            idname = TACTILE_OT_add_subdivision.bl_idname
-            self.layout.operator(idname, icon="MOD_SUBSURF").target = self.target
+            self.layout.operator("tactile.add_subdivision", icon="MOD_SUBSURF").target = self.target
 
 
 class TACTILE_OT_look_farthest(bpy.types.Operator):
@@ -266,7 +264,8 @@ class TACTILE_OT_look_farthest(bpy.types.Operator):
         if view is not None:
             view.view_perspective = "ORTHO" if view.view_perspective == "ORTHO" else "PERSP"
             view.view_location = place
-            view.view_rotation = (turn @ nearest.normal).to_track_quat("Z", "Y")
+            sight = _free_sight(obj.evaluated_get(context.evaluated_depsgraph_get()), nearest, record["size"])
+            view.view_rotation = (turn @ sight).to_track_quat("Z", "Y")
             view.view_distance = SEEN * record["size"] * obj.matrix_world.median_scale
         obj.tactile_colors = DEVIATION
         off, source = deviation(record, "max"), record["source"]
@@ -282,6 +281,13 @@ def _select_nearest(mesh: bpy.types.Mesh, place: Point) -> Any:
     mesh.vertices[nearest].select = True
     mesh.update()
     return mesh.vertices[nearest]
+
+
+def _free_sight(seen: Object, vertex: Any, far: float) -> Vector:
+    """The direction most along a vertex's normal from where nothing that near hides the vertex, if any."""
+    ways = [vertex.normal, *sorted(map(Vector, DIRECTIONS), key=vertex.normal.dot, reverse=True)]
+    start = vertex.co + LIFT * far * vertex.normal
+    return next((way for way in ways if not seen.ray_cast(start, way, distance=far)[0]), vertex.normal)
 
 
 class OnSurface(WithTouches):

@@ -34,7 +34,7 @@ class ObjectTouches:
     """Touches of an evaluated mesh that begin at one place, in the directions of the world.
 
     surface : the mesh as it was, relative to its object's origin
-    explored, found : core.Explorations of the touches so far, and their core.Reconstructions
+    explored : core.Explorations of the touches so far
     rims : how far the finger feels each of their patches all round, (AZIMUTHS,), lengths
     done : the number of touches so far, including those that gave no patch
     words, share : what is going on, and the share of all that is done
@@ -79,7 +79,6 @@ class ObjectTouches:
         """Prepares the `steps` of touches that go on from earlier ones."""
         self._earlier, self._in_vain = earlier, self.done - len(earlier) if earlier else 0
         self.explored: list[core.Exploration] = []
-        self.found: list[core.Reconstruction] = []
         self.rims: list[Array] = []
         self.done = 0
         self.words, self.share = "Looking for a place to begin", 0.0
@@ -168,14 +167,13 @@ class ObjectTouches:
         for exploration, rim in zip(state.found, state.rims, strict=True):
             r = exploration.result
             self.explored.append(exploration)
-            self.found.append(r)
             self.rims.append(rim)
             self._area += r.domain.area
             self._faceted += r.domain.area * self.surface.is_of_facets(r)
             self._left = self._left[~core.covered_by(r, rim, self._left, self.tolerance)]
         self.done = self._in_vain + state.done
         touches, places = many(self.done, "touch", "touches"), many(state.uncovered, "place", "places")
-        patches = many(len(self.found), "patch", "patches")
+        patches = many(len(self.explored), "patch", "patches")
         is_joining = state.joining is not None
         if is_joining is not self._is_joining:
             self._phases, self._before, self._is_joining = self._phases + 1, state.done, is_joining
@@ -277,7 +275,7 @@ class ObjectTouches:
         """The doubt about the place where surface and mesh are farthest apart, as `why_far` has it."""
         place, mesh = self.compared.place, self.whole.mesh
         nearest = int(mesh.patch[np.argmin(((mesh.vertices - place) ** 2).sum(axis=1))])
-        patch = self.found[nearest] if nearest >= 0 else None
+        patch = self.explored[nearest].result if nearest >= 0 else None
         return why_far(self.surface, place, self.compared.largest, patch, found)
 
 

@@ -58,31 +58,31 @@ class GrowingPatches:
         with undo.after_step():  # There is an undo step when the operator ends.
             undo.note_added(obj)
         obj.data.materials.append(emission("Tactile Surface", COLOR))
-        self._patches: list[tuple[Array, Array]] = []
-        self._bends: list[tuple[float, float]] = []  # The larger principal curvature of each, and its area.
+        # The points of each, its mean curvatures there, its larger principal curvature, and its area.
+        self._patches: list[tuple[Array, Array, float, float]] = []
         obj[ABOVE] = 2.0 * DRAWN_ABOVE * surface.size
         self._uid, self._size = obj.session_uid, surface.size
         show_colors()
         show_size(surface.size)
 
-    def add(self, found: Sequence[core.Reconstruction], rims: Sequence[Array]) -> None:
-        """Shows these core.Reconstructions, too, up to their rims, unless somebody has deleted the object."""
+    def add(self, explored: Sequence[core.Exploration], rims: Sequence[Array]) -> None:
+        """Shows the patches of these, too, up to their rims, unless somebody has deleted the object."""
         obj = self._object()
-        if obj is None or not found:
+        if obj is None or not explored:
             return
-        for r, rim in zip(found, rims, strict=True):
+        for r, rim in zip((each.result for each in explored), rims, strict=True):
             points, mean_curvature = _disk(r, rim)
             layer = min(LAYER * self._size, OWN_LAYER * float(np.median(rim)))
             layer *= 1.0 + LAYERS * (GOLDEN_SECTION * len(self._patches) % 1.0)
-            self._patches.append((points + layer * r.frame.axes[:, 2], mean_curvature))
-            self._bends.append((max(abs(r.k1) - r.k1_std, abs(r.k2) - r.k2_std, 0.0), np.mean(rim**2)))
-        points, mean_curvatures = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
+            points += layer * r.frame.axes[:, 2]
+            bend = max(abs(r.k1) - r.k1_std, abs(r.k2) - r.k2_std, 0.0)
+            self._patches.append((points, mean_curvature, bend, float(np.mean(rim**2))))
+        placed, mean_curvatures, bends, areas = zip(*self._patches, strict=True)
         count = 1 + SPOKES * len(RINGS)
         triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
-        bends, areas = np.transpose(self._bends)
-        shades = colors.shades(mean_curvatures, bend_range(bends, areas, self._size))
+        shades = colors.shades(np.concatenate(mean_curvatures), bend_range(bends, areas, self._size))
         shades.reshape(-1, count, 4)[:, -SPOKES:] = RIM_COLOR
-        fill(obj.data, points, triangles, [(COLOR, shades)])
+        fill(obj.data, np.concatenate(placed), triangles, [(COLOR, shades)])
 
     def remove(self) -> None:
         """Deletes the object, if it is still there."""

@@ -162,11 +162,11 @@ def test_the_scenes_unit_is_the_panels(empty, patch, extension):
     found = verified(empty, patch)
     unit = addon.touch.units.unit_of(empty.context.scene, patch["tactile"]["radius"])
     head, *rows, points = addon.comparison.operators.verification_table(patch["tactile"])
-    assert head == ("in mm", "Mesh", "Contacts")
+    assert head == ("in mm", "Mesh | Contacts")
     assert [row[0] for row in rows] == ["Mean", "Median", "Maximum", "RMS"]
-    assert rows[0][1] == f"{found['vertex_distance_mean']:.3g}"
-    assert points == ("Points", str(found["vertices"]), "60")
-    rows = dict(addon.comparison.operators.verification_rows(patch["tactile"]))
+    assert rows[0][1].startswith(f"{found['vertex_distance_mean']:.3g} | ")
+    assert points == ("Points", f"{found['vertices']} | 60")
+    rows = dict(addon.comparison.operators.main_rows(patch["tactile"]))
     assert rows["Overlap"] == "100 %"
     farthest = np.abs(values(patch.data, "deviation")).max()
     assert rows["Largest Deviation"] == addon.touch.units.say(farthest, 1, unit)
@@ -214,7 +214,7 @@ def test_a_coarse_mesh_has_no_vertices_over_the_patch(empty, capfd):
     assert (found["vertices"], found["overlap"], found["extra_contours"]) == (0, 1.0, 9)
     assert found["extra_fit_error"] == pytest.approx(0.0, abs=1e-5)
     assert "vertex_distance_mean" not in found
-    words = '"Plane" has no vertices over the patch to measure, only faces, over 100 % of it'
+    words = 'Info: "Plane" is 0 m off the patch on average, and either is 0 m off the other at most'
     assert words in capfd.readouterr().out
 
 

@@ -70,7 +70,7 @@ def test_a_target_that_moves_as_a_whole_takes_its_probe_along_and_is_not_touched
     probe, patch = pick(empty, (-0.05, -0.9, 0.6))
     probe.tactile_probe.live = live
     report = patch["tactile"].to_dict()
-    before, at = worlds(probe, patch), extension.tactile_addon.probes.probe.reconstruction_of(patch)
+    before, at = worlds(probe, patch), extension.reconstruction_of(patch)
     for power in (1, 2, 3):
         suzanne.matrix_world = MOTION @ suzanne.matrix_world
         empty.context.view_layer.update()
@@ -78,7 +78,7 @@ def test_a_target_that_moves_as_a_whole_takes_its_probe_along_and_is_not_touched
         close(*zip(worlds(probe, patch), motion @ before, strict=True))
         close((probe.matrix_basis, probe.matrix_world))
     assert touches == []
-    now, found = patch["tactile"].to_dict(), extension.tactile_addon.probes.probe.reconstruction_of(patch)
+    now, found = patch["tactile"].to_dict(), extension.reconstruction_of(patch)
     assert (now["status"], now["message"]) == (report["status"], report["message"])
     assert [now[key] for key in ("k1", "k2", "height_std", "coefficients")] == [
         report[key] for key in ("k1", "k2", "height_std", "coefficients")

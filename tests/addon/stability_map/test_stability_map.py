@@ -602,7 +602,7 @@ def test_a_map_of_few_facets_is_in_doubt_and_says_why(empty, extension):
     empty.ops.mesh.primitive_torus_add()
     _, record = stability_map(empty, spacing=0.5)
     assert record["in_doubt"] == record["few_facets"] == record["patches"] > 5
-    words = extension.tactile_addon.stability_map.map_object.facets(record)
+    words = extension.tactile_addon.stability_map.map_object.map_facets(record)
     assert words == f"Curvature of the facets, not of the shape, at {record['patches']} points"
     rows = dict(extension.tactile_addon.stability_map.map_object.map_rows(record))
     assert rows["… on Facets"] == str(record["few_facets"])

@@ -162,6 +162,23 @@ def test_the_farthest_place_is_shown_where_the_surface_is_now(empty, surface):
     assert surface.tactile_colors == "deviation"
 
 
+def test_a_place_below_a_lid_is_looked_at_from_aside(empty, extension):
+    operators = extension.tactile_addon.whole_object.object_operators
+    for height in (0.3, -0.3):  # The second lid is below the plate and hides nothing.
+        empty.ops.mesh.primitive_grid_add(x_subdivisions=4, y_subdivisions=4, size=2.0)
+        plate = empty.context.object
+        empty.ops.mesh.primitive_plane_add(size=0.8, location=(0.0, 0.0, height))
+        plate.select_set(True)
+        empty.context.view_layer.objects.active = plate
+        empty.ops.object.join()
+        seen = plate.evaluated_get(empty.context.evaluated_depsgraph_get())
+        middle = min(plate.data.vertices, key=lambda vertex: vertex.co.length)
+        sight = operators._free_sight(seen, middle, 2.0)
+        assert (sight.z < 0.9) is (height > 0.0)
+        assert sight.z > 0.3
+        assert not seen.ray_cast(middle.co + 0.001 * sight, sight)[0]
+
+
 @pytest.mark.long
 def test_a_surface_reaches_what_is_nearer_than_an_edge_is_long(empty, surface, capfd):
     record = surface["tactile_object"]

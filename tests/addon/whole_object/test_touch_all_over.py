@@ -191,7 +191,7 @@ def begun(empty, extension):
             edge=0.0,
         )
         next(touches.steps())
-        return touches.found[0].point + touches.surface.origin
+        return touches.explored[0].result.point + touches.surface.origin
 
     return begun
 

@@ -79,14 +79,17 @@ def test_growing_patches_are_above_the_mesh_and_each_other(empty, extension, tou
     )
     shown = 0
     for _ in touches.steps():
-        growing.add(touches.found[shown:], touches.rims[shown:])
-        shown = len(touches.found)
+        growing.add(touches.explored[shown:], touches.rims[shown:])
+        shown = len(touches.explored)
     points = positions(empty.data.objects["Cube Touches"].data).reshape(shown, -1, 3)
     shades = np.zeros(4 * points.size // 3, dtype=np.float32)
     empty.data.objects["Cube Touches"].data.attributes["curvature_color"].data.foreach_get("color", shades)
     red, green, blue, _ = shades.reshape(shown, -1, 4)[:, 0].T  # in the middle of each patch
     assert (green > np.maximum(red, blue)).all()  # What is left of K on a flat face is pale.
-    faces = [np.argmax(r.frame.axes[:, 2] @ np.vstack([np.eye(3), -np.eye(3)]).T) for r in touches.found]
+    faces = [
+        np.argmax(each.result.frame.axes[:, 2] @ np.vstack([np.eye(3), -np.eye(3)]).T)
+        for each in touches.explored
+    ]
     above = np.abs(points[:, 0]).max(axis=1) - 1.0
     growing.remove()
     assert 2e-4 < above.min() < above.max() < 5e-3  # The cube's size is 2; narrow patches are nearer to it.
@@ -102,9 +105,9 @@ def test_growing_patches_are_above_a_round_mesh_but_not_far_above_it(empty, ball
         empty.context.scene, touches.surface
     )
     steps = touches.steps()
-    while len(touches.found) < 8:
+    while len(touches.explored) < 8:
         next(steps)
-    growing.add(touches.found, touches.rims)
+    growing.add(touches.explored, touches.rims)
     drawn = empty.data.objects["Sphere Touches"].data
     corners = positions(drawn)[[list(face.vertices) for face in drawn.polygons]]
     places = np.vstack([positions(drawn), corners.mean(axis=1)])
@@ -291,9 +294,9 @@ def progress_of(touches, core):
     left = core.scattered(surface.points, surface.triangles, 1000, rng)[0]
     steps, count = [], 0
     for _ in touches.steps():
-        for r, rim in zip(touches.found[count:], touches.rims[count:], strict=True):
-            left = left[~core.covered_by(r, rim, left, touches.tolerance)]
-        count = len(touches.found)
+        for each, rim in zip(touches.explored[count:], touches.rims[count:], strict=True):
+            left = left[~core.covered_by(each.result, rim, left, touches.tolerance)]
+        count = len(touches.explored)
         steps.append((touches.words.split()[0], touches.share, 1.0 - len(left) / 1000))
         assert ", 0 places left" not in touches.words
     words, shares, felt = zip(*steps, strict=True)
@@ -332,7 +335,7 @@ def test_once_stopped_it_touches_no_more(balls, touches_of, word):
             done = touches.done
     assert done is not None
     assert touches.done == done
-    assert len(touches.found) == len(touches.whole.atlas.patches)
+    assert len(touches.explored) == len(touches.whole.atlas.patches)
 
 
 def test_once_stopped_it_says_that_it_joins(ball, touches_of):
