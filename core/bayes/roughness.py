@@ -19,7 +19,7 @@ from .sextic import mean_given, sextics
 # benchmarks.extents of e20b52a judged these.
 EXPLAINED_TERMS = 15  # Three curves show this many of the 27 terms, which take as many degrees of freedom.
 # A slope that is off by one counts as a height off by this share of L: with 0, and as many fits, touches of
-SLOPE = 0.08  # scans have 4 % less area.
+SLOPE = 0.05  # scans have 3 % less area.
 NOISY = 1.5  # Contacts may be off by this multiple of their noise for no other reason.
 
 
