@@ -29,6 +29,7 @@ from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
 from .object_atlas import AT_ONCE, Atlas, joined_surface
 from .orientation import doubts_of, oriented, place_text, planes_of, sharpened
+from .reference_mesh import ReferenceMesh
 from .unfelt import place_at, uncovered_places
 
 # python -m benchmarks.robot judges these.
@@ -54,6 +55,9 @@ COARSEST = 0.1  # The tolerance is at most this share of the size: larger patche
 # Contacts and surface are off each other by at most this share of the size. Of what evenly spread contacts
 # show, 41 of 60 are "ok" and one of these is off by more, 2.3 %; before, it was 13 of 50, by up to 14 %
 MOST_OFF = 0.02  # (python -m benchmarks.measured --even --first 3, 94f0d791 and 8f74ae57).
+# Planes of contacts meet where they differ by this sine at least, and each passes by within this share of
+# MOST_OFF: otherwise those of the two walls of a thin bowl would meet between these.
+MEETING, MISSED = 0.15, 0.5
 
 
 def atlas_of(
@@ -120,14 +124,18 @@ def _judged(
     limit = MOST_OFF * float(np.ptp(contacts.points, axis=0).max())
     off_planes = partial(_off_planes, atlas.charts, cloud, limit)
     between, alike = yield from chunked(off_planes, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
+    off_corners = partial(_off_corners, atlas.reference, cloud, limit)
+    beyond_it, corners = yield from chunked(off_corners, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
+    spots = np.where((beyond_it > between)[:, None], corners, mesh.vertices)
+    between = np.maximum(between, beyond_it)
     worst, widest = _largest_cluster(far, distances, contacts.links), np.argsort(-between, kind="stable")
     fit_noise = 0.0 if cloud.noise else noise
     off = _doubts_of_contacts(contacts, distances, far, worst, is_turned, limit)
     gaps = widest[:0] if atlas.uncovered else widest[between[widest] > limit]
-    sparse = [Doubt("sparse", between[i], limit, (place_text(mesh.vertices[[i]]),)) for i in gaps[:1]]
+    sparse = [Doubt("sparse", between[i], limit, (place_text(spots[[i]]),)) for i in gaps[:1]]
     # A finger may miss the first of these, so others follow.
     places = [(contacts.points[i], contacts.normals[i]) for i in worst[: len(off)]]
-    places += [(mesh.vertices[i], contacts.normals[alike[i]]) for i in gaps]
+    places += [(spots[i], contacts.normals[alike[i]]) for i in gaps]
     return replace(
         atlas,
         contradictions=(*doubts, *_doubts_of_surface(atlas, fit_noise, most), *off, *sparse),
@@ -274,18 +282,35 @@ def _off_planes(
 
     most : a place within this length of a patch is on it; contacts that face as the patch does agree with it
     """
-    near, contacts = cloud.tree.query(points, ABREAST)[1], cloud.contacts
-    is_alike = np.einsum("nki,ni->nk", contacts.normals[near], normals) > AGREE
-    near = np.take_along_axis(near, np.argsort(~is_alike, axis=1, kind="stable"), axis=1)
-    ways, ups = points[:, None] - contacts.points[near], contacts.normals[near]
-    sheet, steps = sheet_facing(charts, points, normals, most), ways[:, :1] - ways
+    near, above, is_convex, is_concave = cloud.enclosing(points, normals)
+    ups, sheet = cloud.contacts.normals[near], sheet_facing(charts, points, normals, most)
     is_on = (np.einsum("nki,ni->nk", ups, sheet.normal) > AGREE) & (sheet.rho < INSIDE)[:, None]
-    above = np.where(is_on, 0.0, row_dot(ups, ways))
-    # Two walls meet convexly if contacts of both are behind the other's plane, concavely if in front of it.
-    fronts = np.stack([row_dot(ups[:, :1], steps), -row_dot(ups, steps)])
-    is_concave = (fronts > 0.0).all(axis=0) & (row_dot(ups, ups[:, :1]) < AGREE)
-    front = np.where((fronts <= 0.0).all(axis=0), above, -np.inf).max(axis=1)
+    above = np.where(is_on, 0.0, above)
+    front = np.where(is_convex, above, -np.inf).max(axis=1)
     return np.abs(np.minimum(front, np.where(is_concave, above, np.inf).min(axis=1))), near[:, 0]
+
+
+def _off_corners(
+    reference: ReferenceMesh, cloud: "_Cloud", most: float, points: Array, normals: Array
+) -> tuple[Array, Array]:
+    """How far the surface is off corners (n, 3) of what contacts near its places (n, 3) enclose, and these.
+
+    The object may reach up to where planes meet, and a tip or a corner that is cut off is farther from the
+    surface than places of the surface are from any plane. It is 0 where a corner is as near as `most`, where
+    planes do not meet, as those of opposite walls, and where other contacts are in front of it.
+    """
+    near, above, is_convex, _ = cloud.enclosing(points, normals)
+    planes = np.where(is_convex[..., None], cloud.contacts.normals[near], 0.0)
+    across = np.swapaxes(planes, 1, 2)
+    inverses = np.linalg.pinv(across @ planes, rcond=MEETING**2, hermitian=True)
+    moves = -np.einsum("nij,njk,nk->ni", inverses, across, above)
+    missed = np.where(is_convex, np.abs(above + row_dot(planes, moves[:, None])), 0.0).max(axis=1)
+    corners, off = points + moves, np.zeros(len(points))
+    some = np.flatnonzero((row_dot(moves, moves) > most**2) & (missed < MISSED * most))
+    _, above, is_convex, _ = cloud.enclosing(corners[some], normals[some])
+    some = some[np.where(is_convex, above, 0.0).max(axis=1) < MISSED * most]
+    off[some] = np.linalg.norm(reference.feet(corners[some])[0] - corners[some], axis=1)
+    return off, corners
 
 
 def _doubts_of_surface(atlas: Atlas, noise: float, most: float) -> Iterator[Doubt]:
@@ -350,6 +375,24 @@ class _Cloud(NamedTuple):
     tree: Any
     noise: float
     largest: float | None
+
+    def enclosing(
+        self, points: Array, normals: Array
+    ) -> tuple[Indices, Array, NDArray[np.bool_], NDArray[np.bool_]]:
+        """The nearest contacts (n, k) of places (n, 3) with normals (n, 3), those that face alike first.
+
+        Also how far above their planes the places are, and which of them enclose these together with the
+        first one, around a convex edge and around a concave one.
+        """
+        near, contacts = self.tree.query(points, ABREAST)[1], self.contacts
+        is_alike = np.einsum("nki,ni->nk", contacts.normals[near], normals) > AGREE
+        near = np.take_along_axis(near, np.argsort(~is_alike, axis=1, kind="stable"), axis=1)
+        ways, ups = points[:, None] - contacts.points[near], contacts.normals[near]
+        steps = ways[:, :1] - ways
+        # Walls meet convexly if contacts of both are behind the other's plane, concavely if in front of it.
+        fronts = np.stack([row_dot(ups[:, :1], steps), -row_dot(ups, steps)])
+        is_concave = (fronts > 0.0).all(axis=0) & (row_dot(ups, ups[:, :1]) < AGREE)
+        return near, row_dot(ups, ways), (fronts <= 0.0).all(axis=0), is_concave
 
     def same_sheet(self, i: int, radius: float) -> Indices:
         """Those contacts around contact i that face the same way and are linked with it, so of its wall."""

@@ -248,6 +248,28 @@ def test_edges_that_no_contact_is_near_are_a_doubt_that_names_one():
     assert len(atlas.unexplained) > 1  # A finger may miss the first.
 
 
+def random_on_cone(count, seed=0):
+    """Contacts at random on a cone of radius .5 and height 1, and on its base."""
+    rng = np.random.default_rng(seed)
+    turn, u, is_base = 2.0 * np.pi * rng.random(count), np.sqrt(rng.random(count)), rng.random(count) < 0.309
+    around = np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)
+    side = np.column_stack([0.5 * u[:, None] * around[:, :2], 1.0 - u])
+    slant = (around + np.array([0.0, 0.0, 0.5])) / np.hypot(1.0, 0.5)
+    points = np.where(is_base[:, None], side * (1.0, 1.0, 0.0), side)
+    return core.Contour(points, normals=np.where(is_base[:, None], (0.0, 0.0, -1.0), slant))
+
+
+def test_a_tip_that_is_cut_off_is_a_doubt_though_no_plane_is_far_from_the_surface():
+    for seed, status in ((4, "uncertain"), (7, "ok")):
+        atlas = core.atlas_of([random_on_cone(1200, seed)])
+        off = abs(atlas.distance([(0.0, 0.0, 1.0)])[0][0])
+        assert (off > measured.MOST_OFF) == (status == "uncertain")
+        assert atlas.status == status
+        if atlas.doubts:
+            assert atlas.doubts[0].value == pytest.approx(off, rel=0.02)
+            assert atlas.next_touch().point == pytest.approx((0.0, 0.0, 1.0), abs=1e-3)
+
+
 def test_no_fin_along_a_wall_goes_on_past_the_edges_of_few_contacts():
     atlas = core.atlas_of([few_on_box(800)])
     assert atlas.status == "ok"
