@@ -28,7 +28,7 @@ from .finger import FACING
 from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
 from .object_atlas import AT_ONCE, Atlas, joined_surface
-from .orientation import doubts_of, oriented, place_text, planes_of, sharpened
+from .orientation import THROUGH, doubts_of, oriented, place_text, planes_of, sharpened
 from .reference_mesh import ReferenceMesh
 from .unfelt import place_at, uncovered_places
 
@@ -102,24 +102,25 @@ def cover_contacts(
     contacts, doubts = _contacts(*felt, outward, noise)
     cloud = _Cloud(contacts, cKDTree(contacts.points), noise, largest)
     yield 0.0
-    radius, noise = yield from cloud.least_radius_and_noise(radius)
-    patches, charts = yield from _patches(cloud._replace(noise=noise), radius)
+    radius, fit_noise = yield from cloud.least_radius_and_noise(radius)
+    cloud = cloud._replace(noise=fit_noise)
+    patches, charts = yield from _patches(cloud, radius)
     reference = yield from part_of(joined_surface(patches, charts, largest, contacts.off), 1.0, 1.0)
     uncovered = uncovered_places(reference, charts)
     atlas = Atlas(tuple(patches), charts, reference, largest, uncovered, contacts=contacts)
-    return (yield from _judged(atlas, cloud, doubts, noise, radius))
+    return (yield from _judged(atlas, cloud, doubts, 0.0 if noise else fit_noise, radius))
 
 
 def _judged(
-    atlas: Atlas, cloud: "_Cloud", doubts: list[Doubt], noise: float, radius: float
+    atlas: Atlas, cloud: "_Cloud", doubts: list[Doubt], fit_noise: float, radius: float
 ) -> Generator[float, None, Atlas]:
     """The atlas with its doubts: these, and those of how contacts and surface are off each other; yields 1.
 
-    noise : that of the fit
+    fit_noise : that of the fit, or 0 if one was given
     radius : the least of a patch
     """
     contacts, mesh, most = cloud.contacts, atlas.reference.mesh, atlas.tolerance or GROWN * radius
-    off_surface = partial(_off_surface, atlas, noise, most)
+    off_surface = partial(_off_surface, atlas, cloud.noise, most)
     distances, far, is_turned = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
     limit = MOST_OFF * float(np.ptp(contacts.points, axis=0).max())
     off_planes = partial(_off_planes, atlas.charts, cloud, limit)
@@ -129,7 +130,6 @@ def _judged(
     spots = np.where((beyond_it > between)[:, None], corners, mesh.vertices)
     between = np.maximum(between, beyond_it)
     worst, widest = _largest_cluster(far, distances, contacts.links), np.argsort(-between, kind="stable")
-    fit_noise = 0.0 if cloud.noise else noise
     off = _doubts_of_contacts(contacts, distances, far, worst, is_turned, limit)
     gaps = widest[:0] if atlas.uncovered else widest[between[widest] > limit]
     sparse = [Doubt("sparse", between[i], limit, (place_text(spots[[i]]),)) for i in gaps[:1]]
@@ -390,9 +390,9 @@ class _Cloud(NamedTuple):
         ways, ups = points[:, None] - contacts.points[near], contacts.normals[near]
         steps = ways[:, :1] - ways
         # Walls meet convexly if contacts of both are behind the other's plane, concavely if in front of it.
-        fronts = np.stack([row_dot(ups[:, :1], steps), -row_dot(ups, steps)])
-        is_concave = (fronts > 0.0).all(axis=0) & (row_dot(ups, ups[:, :1]) < AGREE)
-        return near, row_dot(ups, ways), (fronts <= 0.0).all(axis=0), is_concave
+        is_front = np.stack([row_dot(ups[:, :1], steps), -row_dot(ups, steps)]) > THROUGH * self.noise
+        is_concave = is_front.all(axis=0) & (row_dot(ups, ups[:, :1]) < AGREE)
+        return near, row_dot(ups, ways), ~is_front.any(axis=0), is_concave
 
     def same_sheet(self, i: int, radius: float) -> Indices:
         """Those contacts around contact i that face the same way and are linked with it, so of its wall."""
