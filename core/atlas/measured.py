@@ -29,7 +29,6 @@ from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
 from .object_atlas import AT_ONCE, Atlas, joined_surface
 from .orientation import THROUGH, doubts_of, oriented, place_text, planes_of, sharpened
-from .reference_mesh import ReferenceMesh
 from .unfelt import place_at, uncovered_places
 
 # python -m benchmarks.robot judges these.
@@ -58,6 +57,9 @@ MOST_OFF = 0.02  # (python -m benchmarks.measured --even --first 3, 94f0d791 and
 # Planes of contacts meet where they differ by this sine at least, and each passes by within this share of
 # MOST_OFF: otherwise those of the two walls of a thin bowl would meet between these.
 MEETING, MISSED = 0.15, 0.5
+# A plane that another contact is in front of by more than this share, and not the other way around, encloses
+# nothing: without normals, those of an L's edge are of both its walls (seed 87 of --full 100).
+CONTRADICTED = 0.25
 
 
 def atlas_of(
@@ -123,12 +125,8 @@ def _judged(
     off_surface = partial(_off_surface, atlas, cloud.noise, most)
     distances, far, is_turned = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
     limit = MOST_OFF * float(np.ptp(contacts.points, axis=0).max())
-    off_planes = partial(_off_planes, atlas.charts, cloud, limit)
-    between, alike = yield from chunked(off_planes, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
-    off_corners = partial(_off_corners, atlas.reference, cloud, limit)
-    beyond_it, corners = yield from chunked(off_corners, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
-    spots = np.where((beyond_it > between)[:, None], corners, mesh.vertices)
-    between = np.maximum(between, beyond_it)
+    off_enclosed = partial(_off_enclosed, atlas, cloud, limit)
+    between, spots, alike = yield from chunked(off_enclosed, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
     worst, widest = _largest_cluster(far, distances, contacts.links), np.argsort(-between, kind="stable")
     off = _doubts_of_contacts(contacts, distances, far, worst, is_turned, limit)
     gaps = widest[:0] if atlas.uncovered else widest[between[widest] > limit]
@@ -270,47 +268,32 @@ def _off_surface(
     return np.abs(distances), far | is_turned, is_turned
 
 
-def _off_planes(
-    charts: Charts, cloud: "_Cloud", most: float, points: Array, normals: Array
-) -> tuple[Array, Indices]:
-    """How far places (n, 3) of the surface are off what nearest contacts enclose, and the first, (n,).
+def _off_enclosed(
+    atlas: Atlas, cloud: "_Cloud", most: float, points: Array, normals: Array
+) -> tuple[Array, Array, Indices]:
+    """How far places (n, 3) of the surface are off what nearest contacts enclose, where, and the first, (n,).
 
     Between contacts the surface may be anywhere up to the plane of the nearest that faces alike, if any does:
-    an edge that no contact is near is cut off by half of their distance. Where others are around a convex
-    edge it is behind their planes, too, and before one of them around a concave edge. So the foot of an edge
-    that is cut off is on its wall, and a fin along one wall is off the other.
+    an edge that no contact is near is cut off by half of their distance. Where planes meet, the object may
+    reach up to their corner, and a tip that is cut off is farther from the surface than the surface is from
+    any plane. A corner counts if it is enclosed, too, so no other contact is in front of it.
 
-    most : a place within this length of a patch is on it; contacts that face as the patch does agree with it
+    most : corners that are as near as this length do not count, and a place within it of a patch is on it
     """
-    near, above, is_convex, is_concave = cloud.enclosing(points, normals)
-    ups, sheet = cloud.contacts.normals[near], sheet_facing(charts, points, normals, most)
-    is_on = (np.einsum("nki,ni->nk", ups, sheet.normal) > AGREE) & (sheet.rho < INSIDE)[:, None]
-    above = np.where(is_on, 0.0, above)
-    front = np.where(is_convex, above, -np.inf).max(axis=1)
-    return np.abs(np.minimum(front, np.where(is_concave, above, np.inf).min(axis=1))), near[:, 0]
-
-
-def _off_corners(
-    reference: ReferenceMesh, cloud: "_Cloud", most: float, points: Array, normals: Array
-) -> tuple[Array, Array]:
-    """How far the surface is off corners (n, 3) of what contacts near its places (n, 3) enclose, and these.
-
-    The object may reach up to where planes meet, and a tip or a corner that is cut off is farther from the
-    surface than places of the surface are from any plane. It is 0 where a corner is as near as `most`, where
-    planes do not meet, as those of opposite walls, and where other contacts are in front of it.
-    """
-    near, above, is_convex, _ = cloud.enclosing(points, normals)
-    planes = np.where(is_convex[..., None], cloud.contacts.normals[near], 0.0)
+    sheet = sheet_facing(atlas.charts, points, normals, most)
+    sheets = np.where((sheet.rho < INSIDE)[:, None], sheet.normal, 0.0)
+    planes, above, off, nearest = cloud.enclosing(points, normals, most, sheets)
     across = np.swapaxes(planes, 1, 2)
     inverses = np.linalg.pinv(across @ planes, rcond=MEETING**2, hermitian=True)
     moves = -np.einsum("nij,njk,nk->ni", inverses, across, above)
-    missed = np.where(is_convex, np.abs(above + row_dot(planes, moves[:, None])), 0.0).max(axis=1)
-    corners, off = points + moves, np.zeros(len(points))
+    missed = np.abs(above + row_dot(planes, moves[:, None])).max(axis=1)
     some = np.flatnonzero((row_dot(moves, moves) > most**2) & (missed < MISSED * most))
-    _, above, is_convex, _ = cloud.enclosing(corners[some], normals[some])
-    some = some[np.where(is_convex, above, 0.0).max(axis=1) < MISSED * most]
-    off[some] = np.linalg.norm(reference.feet(corners[some])[0] - corners[some], axis=1)
-    return off, corners
+    corners, away = points + moves, np.zeros(len(points))
+    _, _, corner_off, _ = cloud.enclosing(corners[some], normals[some], most, 0.0 * corners[some])
+    some = some[np.abs(corner_off) < MISSED * most]
+    away[some] = np.linalg.norm(atlas.reference.feet(corners[some])[0] - corners[some], axis=1)
+    where = np.where((away > np.abs(off))[:, None], corners, points)
+    return np.maximum(away, np.abs(off)), where, nearest
 
 
 def _doubts_of_surface(atlas: Atlas, noise: float, most: float) -> Iterator[Doubt]:
@@ -356,16 +339,14 @@ def _agreement(
     noise: float,
 ) -> str:
     """How contacts (n,) agree with the surface if there is no doubt; `noise` is that of the fit, or 0."""
-    message = "The surface is closed, and all contacts agree with it."
-    if far.any():
-        message = (
-            f"The surface is closed. All but {np.count_nonzero(far)} of {len(far)} contacts agree with it, "
-            f"which are off by up to {distances[far].max():.2g}, most together around "
-            f"{place_text(contacts.points[worst[:1]])}."
-        )
-    if noise:
-        message += f" No noise was given; that of the fit is {noise:.2g}."
-    return message
+    closed = (
+        f"The surface is closed. All but {np.count_nonzero(far)} of {len(far)} contacts agree with it, "
+        f"which are off by up to {distances[far].max():.2g}, most together around "
+        f"{place_text(contacts.points[worst[:1]])}."
+        if far.any()
+        else "The surface is closed, and all contacts agree with it."
+    )
+    return closed + (f" No noise was given; that of the fit is {noise:.2g}." if noise else "")
 
 
 class _Cloud(NamedTuple):
@@ -377,22 +358,35 @@ class _Cloud(NamedTuple):
     largest: float | None
 
     def enclosing(
-        self, points: Array, normals: Array
-    ) -> tuple[Indices, Array, NDArray[np.bool_], NDArray[np.bool_]]:
-        """The nearest contacts (n, k) of places (n, 3) with normals (n, 3), those that face alike first.
+        self, points: Array, normals: Array, most: float, sheets: Array
+    ) -> tuple[Array, Array, Array, Indices]:
+        """How far places (n, 3) with normals (n, 3) are above what the nearest contacts enclose, (n,).
 
-        Also how far above their planes the places are, and which of them enclose these together with the
-        first one, around a convex edge and around a concave one.
+        Before it the normals of contacts whose planes do so around a convex edge, (n, k, 3), and how far
+        above these the places are, (n, k); 0 elsewhere. The first contact, (n,), faces alike, if any does.
+        Where others are around a convex edge a place is behind their planes, too, and before one of them
+        around a concave edge. So the foot of an edge that is cut off is on its wall, and a fin along one wall
+        is off the other. Contacts agree with a patch that faces as they do.
+
+        most : a plane that a contact of another wall is in front of by less than a quarter of it may enclose
+        sheets : (n, 3), normals of the patches that the places are on, or 0
         """
         near, contacts = self.tree.query(points, ABREAST)[1], self.contacts
         is_alike = np.einsum("nki,ni->nk", contacts.normals[near], normals) > AGREE
         near = np.take_along_axis(near, np.argsort(~is_alike, axis=1, kind="stable"), axis=1)
-        ways, ups = points[:, None] - contacts.points[near], contacts.normals[near]
-        steps = ways[:, :1] - ways
+        places, ups = contacts.points[near], contacts.normals[near]
+        above = row_dot(ups, points[:, None] - places)
         # Walls meet convexly if contacts of both are behind the other's plane, concavely if in front of it.
-        is_front = np.stack([row_dot(ups[:, :1], steps), -row_dot(ups, steps)]) > THROUGH * self.noise
-        is_concave = is_front.all(axis=0) & (row_dot(ups, ups[:, :1]) < AGREE)
-        return near, row_dot(ups, ways), ~is_front.any(axis=0), is_concave
+        fronts = row_dot(ups[:, :, None], places[:, None] - places[:, :, None])
+        is_front = fronts > THROUGH * self.noise
+        is_wrong = ((fronts > CONTRADICTED * most) & ~np.swapaxes(is_front, 1, 2)).any(axis=2)
+        is_wrong[:, 0] = False
+        is_convex = ~(is_front[:, 0] | is_front[:, :, 0] | is_wrong)
+        is_concave = is_front[:, 0] & is_front[:, :, 0] & (row_dot(ups, ups[:, :1]) < AGREE)
+        off = np.where(np.einsum("nki,ni->nk", ups, sheets) > AGREE, 0.0, above)
+        front = np.where(is_convex, off, -np.inf).max(axis=1)
+        off = np.minimum(front, np.where(is_concave, off, np.inf).min(axis=1))
+        return np.where(is_convex[..., None], ups, 0.0), np.where(is_convex, above, 0.0), off, near[:, 0]
 
     def same_sheet(self, i: int, radius: float) -> Indices:
         """Those contacts around contact i that face the same way and are linked with it, so of its wall."""

@@ -270,6 +270,29 @@ def test_a_tip_that_is_cut_off_is_a_doubt_though_no_plane_is_far_from_the_surfac
             assert atlas.next_touch().point == pytest.approx((0.0, 0.0, 1.0), abs=1e-3)
 
 
+def off_edge(place, noise=0.0, odd=None):
+    """How far a place is off an edge of two walls, up to which one was felt; one contact may be odd there."""
+    out = np.array([0.1, 0.12, 0.14, 0.16])
+    along, none = np.array([-0.03, 0.01, 0.03, -0.01]), np.zeros(4)
+    points = np.vstack([np.column_stack([-out, along, none]), np.column_stack([none, along, -out])])
+    normals = np.repeat(np.eye(3)[[2, 0]], 4, axis=0)
+    points[:4, 0] = noise or points[:4, 0]
+    normals[1] = normals[1] if odd is None else odd
+    contacts = measured.MeasuredContacts(points, normals, np.ones(8), np.zeros((8, 1), dtype=int))
+    cloud, place = measured._Cloud(contacts, cKDTree(points), noise, None), np.array([place])
+    return cloud.enclosing(place, np.array([[1.0, 0.0, 0.0]]), 0.04, 0.0 * place)[2][0]
+
+
+def test_a_fin_along_a_wall_is_off_the_other_within_the_noise_of_its_contacts():
+    for noise in (0.0, 0.004):
+        assert off_edge((0.0, 0.0, 0.03), noise) == pytest.approx(0.03)
+
+
+def test_a_plane_that_contacts_of_its_wall_are_in_front_of_encloses_nothing():
+    for odd in (None, (0.6, 0.0, 0.8)):
+        assert off_edge((0.0, 0.0, 0.0), odd=odd) == pytest.approx(0.0, abs=1e-12)
+
+
 def test_no_fin_along_a_wall_goes_on_past_the_edges_of_few_contacts():
     atlas = core.atlas_of([few_on_box(800)])
     assert atlas.status == "ok"
