@@ -368,7 +368,7 @@ class _Cloud(NamedTuple):
         around a concave edge. So the foot of an edge that is cut off is on its wall, and a fin along one wall
         is off the other. Contacts agree with a patch that faces as they do.
 
-        most : a plane that a contact of another wall is in front of by less than a quarter of it may enclose
+        most : planes that a contact is in front of by more than CONTRADICTED of this length enclose nothing
         sheets : (n, 3), normals of the patches that the places are on, or 0
         """
         near, contacts = self.tree.query(points, ABREAST)[1], self.contacts
