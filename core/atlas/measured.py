@@ -28,7 +28,7 @@ from .finger import FACING
 from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
 from .object_atlas import AT_ONCE, Atlas, joined_surface
-from .orientation import doubts_of, oriented, place_text, planes_of, sharpened
+from .orientation import THROUGH, doubts_of, oriented, place_text, planes_of, sharpened
 from .unfelt import place_at, uncovered_places
 
 # python -m benchmarks.robot judges these.
@@ -54,6 +54,12 @@ COARSEST = 0.1  # The tolerance is at most this share of the size: larger patche
 # Contacts and surface are off each other by at most this share of the size. Of what evenly spread contacts
 # show, 41 of 60 are "ok" and one of these is off by more, 2.3 %; before, it was 13 of 50, by up to 14 %
 MOST_OFF = 0.02  # (python -m benchmarks.measured --even --first 3, 94f0d791 and 8f74ae57).
+# Planes of contacts meet where they differ by this sine at least, and each passes by within this share of
+# MOST_OFF: otherwise those of the two walls of a thin bowl would meet between these.
+MEETING, MISSED = 0.15, 0.5
+# A plane that another contact is in front of by more than this share, and not the other way around, encloses
+# nothing: without normals, those of an L's edge are of both its walls (seed 87 of --full 100).
+CONTRADICTED = 0.25
 
 
 def atlas_of(
@@ -98,36 +104,36 @@ def cover_contacts(
     contacts, doubts = _contacts(*felt, outward, noise)
     cloud = _Cloud(contacts, cKDTree(contacts.points), noise, largest)
     yield 0.0
-    radius, noise = yield from cloud.least_radius_and_noise(radius)
-    patches, charts = yield from _patches(cloud._replace(noise=noise), radius)
+    radius, fit_noise = yield from cloud.least_radius_and_noise(radius)
+    cloud = cloud._replace(noise=fit_noise)
+    patches, charts = yield from _patches(cloud, radius)
     reference = yield from part_of(joined_surface(patches, charts, largest, contacts.off), 1.0, 1.0)
     uncovered = uncovered_places(reference, charts)
     atlas = Atlas(tuple(patches), charts, reference, largest, uncovered, contacts=contacts)
-    return (yield from _judged(atlas, cloud, doubts, noise, radius))
+    return (yield from _judged(atlas, cloud, doubts, 0.0 if noise else fit_noise, radius))
 
 
 def _judged(
-    atlas: Atlas, cloud: "_Cloud", doubts: list[Doubt], noise: float, radius: float
+    atlas: Atlas, cloud: "_Cloud", doubts: list[Doubt], fit_noise: float, radius: float
 ) -> Generator[float, None, Atlas]:
     """The atlas with its doubts: these, and those of how contacts and surface are off each other; yields 1.
 
-    noise : that of the fit
+    fit_noise : that of the fit, or 0 if one was given
     radius : the least of a patch
     """
     contacts, mesh, most = cloud.contacts, atlas.reference.mesh, atlas.tolerance or GROWN * radius
-    off_surface = partial(_off_surface, atlas, noise, most)
+    off_surface = partial(_off_surface, atlas, cloud.noise, most)
     distances, far, is_turned = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
     limit = MOST_OFF * float(np.ptp(contacts.points, axis=0).max())
-    off_planes = partial(_off_planes, atlas.charts, cloud, limit)
-    between, alike = yield from chunked(off_planes, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
+    off_enclosed = partial(_off_enclosed, atlas, cloud, limit)
+    between, spots, alike = yield from chunked(off_enclosed, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
     worst, widest = _largest_cluster(far, distances, contacts.links), np.argsort(-between, kind="stable")
-    fit_noise = 0.0 if cloud.noise else noise
     off = _doubts_of_contacts(contacts, distances, far, worst, is_turned, limit)
     gaps = widest[:0] if atlas.uncovered else widest[between[widest] > limit]
-    sparse = [Doubt("sparse", between[i], limit, (place_text(mesh.vertices[[i]]),)) for i in gaps[:1]]
+    sparse = [Doubt("sparse", between[i], limit, (place_text(spots[[i]]),)) for i in gaps[:1]]
     # A finger may miss the first of these, so others follow.
     places = [(contacts.points[i], contacts.normals[i]) for i in worst[: len(off)]]
-    places += [(mesh.vertices[i], contacts.normals[alike[i]]) for i in gaps]
+    places += [(spots[i], contacts.normals[alike[i]]) for i in gaps]
     return replace(
         atlas,
         contradictions=(*doubts, *_doubts_of_surface(atlas, fit_noise, most), *off, *sparse),
@@ -262,30 +268,32 @@ def _off_surface(
     return np.abs(distances), far | is_turned, is_turned
 
 
-def _off_planes(
-    charts: Charts, cloud: "_Cloud", most: float, points: Array, normals: Array
-) -> tuple[Array, Indices]:
-    """How far places (n, 3) of the surface are off what nearest contacts enclose, and the first, (n,).
+def _off_enclosed(
+    atlas: Atlas, cloud: "_Cloud", most: float, points: Array, normals: Array
+) -> tuple[Array, Array, Indices]:
+    """How far places (n, 3) of the surface are off what nearest contacts enclose, where, and the first, (n,).
 
     Between contacts the surface may be anywhere up to the plane of the nearest that faces alike, if any does:
-    an edge that no contact is near is cut off by half of their distance. Where others are around a convex
-    edge it is behind their planes, too, and before one of them around a concave edge. So the foot of an edge
-    that is cut off is on its wall, and a fin along one wall is off the other.
+    an edge that no contact is near is cut off by half of their distance. Where planes meet, the object may
+    reach up to their corner, and a tip that is cut off is farther from the surface than the surface is from
+    any plane. A corner counts if it is enclosed, too, so no other contact is in front of it.
 
-    most : a place within this length of a patch is on it; contacts that face as the patch does agree with it
+    most : corners that are as near as this length do not count, and a place within it of a patch is on it
     """
-    near, contacts = cloud.tree.query(points, ABREAST)[1], cloud.contacts
-    is_alike = np.einsum("nki,ni->nk", contacts.normals[near], normals) > AGREE
-    near = np.take_along_axis(near, np.argsort(~is_alike, axis=1, kind="stable"), axis=1)
-    ways, ups = points[:, None] - contacts.points[near], contacts.normals[near]
-    sheet, steps = sheet_facing(charts, points, normals, most), ways[:, :1] - ways
-    is_on = (np.einsum("nki,ni->nk", ups, sheet.normal) > AGREE) & (sheet.rho < INSIDE)[:, None]
-    above = np.where(is_on, 0.0, row_dot(ups, ways))
-    # Two walls meet convexly if contacts of both are behind the other's plane, concavely if in front of it.
-    fronts = np.stack([row_dot(ups[:, :1], steps), -row_dot(ups, steps)])
-    is_concave = (fronts > 0.0).all(axis=0) & (row_dot(ups, ups[:, :1]) < AGREE)
-    front = np.where((fronts <= 0.0).all(axis=0), above, -np.inf).max(axis=1)
-    return np.abs(np.minimum(front, np.where(is_concave, above, np.inf).min(axis=1))), near[:, 0]
+    sheet = sheet_facing(atlas.charts, points, normals, most)
+    sheets = np.where((sheet.rho < INSIDE)[:, None], sheet.normal, 0.0)
+    planes, above, off, nearest = cloud.enclosing(points, normals, most, sheets)
+    across = np.swapaxes(planes, 1, 2)
+    inverses = np.linalg.pinv(across @ planes, rcond=MEETING**2, hermitian=True)
+    moves = -np.einsum("nij,njk,nk->ni", inverses, across, above)
+    missed = np.abs(above + row_dot(planes, moves[:, None])).max(axis=1)
+    some = np.flatnonzero((row_dot(moves, moves) > most**2) & (missed < MISSED * most))
+    corners, away = points + moves, np.zeros(len(points))
+    _, _, corner_off, _ = cloud.enclosing(corners[some], normals[some], most, 0.0 * corners[some])
+    some = some[np.abs(corner_off) < MISSED * most]
+    away[some] = np.linalg.norm(atlas.reference.feet(corners[some])[0] - corners[some], axis=1)
+    where = np.where((away > np.abs(off))[:, None], corners, points)
+    return np.maximum(away, np.abs(off)), where, nearest
 
 
 def _doubts_of_surface(atlas: Atlas, noise: float, most: float) -> Iterator[Doubt]:
@@ -331,16 +339,14 @@ def _agreement(
     noise: float,
 ) -> str:
     """How contacts (n,) agree with the surface if there is no doubt; `noise` is that of the fit, or 0."""
-    message = "The surface is closed, and all contacts agree with it."
-    if far.any():
-        message = (
-            f"The surface is closed. All but {np.count_nonzero(far)} of {len(far)} contacts agree with it, "
-            f"which are off by up to {distances[far].max():.2g}, most together around "
-            f"{place_text(contacts.points[worst[:1]])}."
-        )
-    if noise:
-        message += f" No noise was given; that of the fit is {noise:.2g}."
-    return message
+    closed = (
+        f"The surface is closed. All but {np.count_nonzero(far)} of {len(far)} contacts agree with it, "
+        f"which are off by up to {distances[far].max():.2g}, most together around "
+        f"{place_text(contacts.points[worst[:1]])}."
+        if far.any()
+        else "The surface is closed, and all contacts agree with it."
+    )
+    return closed + (f" No noise was given; that of the fit is {noise:.2g}." if noise else "")
 
 
 class _Cloud(NamedTuple):
@@ -350,6 +356,37 @@ class _Cloud(NamedTuple):
     tree: Any
     noise: float
     largest: float | None
+
+    def enclosing(
+        self, points: Array, normals: Array, most: float, sheets: Array
+    ) -> tuple[Array, Array, Array, Indices]:
+        """How far places (n, 3) with normals (n, 3) are above what the nearest contacts enclose, (n,).
+
+        Before it the normals of contacts whose planes do so around a convex edge, (n, k, 3), and how far
+        above these the places are, (n, k); 0 elsewhere. The first contact, (n,), faces alike, if any does.
+        Where others are around a convex edge a place is behind their planes, too, and before one of them
+        around a concave edge. So the foot of an edge that is cut off is on its wall, and a fin along one wall
+        is off the other. Contacts agree with a patch that faces as they do.
+
+        most : planes that a contact is in front of by more than CONTRADICTED of this length enclose nothing
+        sheets : (n, 3), normals of the patches that the places are on, or 0
+        """
+        near, contacts = self.tree.query(points, ABREAST)[1], self.contacts
+        is_alike = np.einsum("nki,ni->nk", contacts.normals[near], normals) > AGREE
+        near = np.take_along_axis(near, np.argsort(~is_alike, axis=1, kind="stable"), axis=1)
+        places, ups = contacts.points[near], contacts.normals[near]
+        above = row_dot(ups, points[:, None] - places)
+        # Walls meet convexly if contacts of both are behind the other's plane, concavely if in front of it.
+        fronts = row_dot(ups[:, :, None], places[:, None] - places[:, :, None])
+        is_front = fronts > THROUGH * self.noise
+        is_wrong = ((fronts > CONTRADICTED * most) & ~np.swapaxes(is_front, 1, 2)).any(axis=2)
+        is_wrong[:, 0] = False
+        is_convex = ~(is_front[:, 0] | is_front[:, :, 0] | is_wrong)
+        is_concave = is_front[:, 0] & is_front[:, :, 0] & (row_dot(ups, ups[:, :1]) < AGREE)
+        off = np.where(np.einsum("nki,ni->nk", ups, sheets) > AGREE, 0.0, above)
+        front = np.where(is_convex, off, -np.inf).max(axis=1)
+        off = np.minimum(front, np.where(is_concave, off, np.inf).min(axis=1))
+        return np.where(is_convex[..., None], ups, 0.0), np.where(is_convex, above, 0.0), off, near[:, 0]
 
     def same_sheet(self, i: int, radius: float) -> Indices:
         """Those contacts around contact i that face the same way and are linked with it, so of its wall."""

@@ -248,6 +248,51 @@ def test_edges_that_no_contact_is_near_are_a_doubt_that_names_one():
     assert len(atlas.unexplained) > 1  # A finger may miss the first.
 
 
+def random_on_cone(count, seed=0):
+    """Contacts at random on a cone of radius .5 and height 1, and on its base."""
+    rng = np.random.default_rng(seed)
+    turn, u, is_base = 2.0 * np.pi * rng.random(count), np.sqrt(rng.random(count)), rng.random(count) < 0.309
+    around = np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)
+    side = np.column_stack([0.5 * u[:, None] * around[:, :2], 1.0 - u])
+    slant = (around + np.array([0.0, 0.0, 0.5])) / np.hypot(1.0, 0.5)
+    points = np.where(is_base[:, None], side * (1.0, 1.0, 0.0), side)
+    return core.Contour(points, normals=np.where(is_base[:, None], (0.0, 0.0, -1.0), slant))
+
+
+def test_a_tip_that_is_cut_off_is_a_doubt_though_no_plane_is_far_from_the_surface():
+    for seed, status in ((4, "uncertain"), (7, "ok")):
+        atlas = core.atlas_of([random_on_cone(1200, seed)])
+        off = abs(atlas.distance([(0.0, 0.0, 1.0)])[0][0])
+        assert (off > measured.MOST_OFF) == (status == "uncertain")
+        assert atlas.status == status
+        if atlas.doubts:
+            assert atlas.doubts[0].value == pytest.approx(off, rel=0.02)
+            assert atlas.next_touch().point == pytest.approx((0.0, 0.0, 1.0), abs=1e-3)
+
+
+def off_edge(place, noise=0.0, odd=None):
+    """How far a place is off an edge of two walls, up to which one was felt; one contact may be odd there."""
+    out = np.array([0.1, 0.12, 0.14, 0.16])
+    along, none = np.array([-0.03, 0.01, 0.03, -0.01]), np.zeros(4)
+    points = np.vstack([np.column_stack([-out, along, none]), np.column_stack([none, along, -out])])
+    normals = np.repeat(np.eye(3)[[2, 0]], 4, axis=0)
+    points[:4, 0] = noise or points[:4, 0]
+    normals[1] = normals[1] if odd is None else odd
+    contacts = measured.MeasuredContacts(points, normals, np.ones(8), np.zeros((8, 1), dtype=int))
+    cloud, place = measured._Cloud(contacts, cKDTree(points), noise, None), np.array([place])
+    return cloud.enclosing(place, np.array([[1.0, 0.0, 0.0]]), 0.04, 0.0 * place)[2][0]
+
+
+def test_a_fin_along_a_wall_is_off_the_other_within_the_noise_of_its_contacts():
+    for noise in (0.0, 0.004):
+        assert off_edge((0.0, 0.0, 0.03), noise) == pytest.approx(0.03)
+
+
+def test_a_plane_that_contacts_of_its_wall_are_in_front_of_encloses_nothing():
+    for odd in (None, (0.6, 0.0, 0.8)):
+        assert off_edge((0.0, 0.0, 0.0), odd=odd) == pytest.approx(0.0, abs=1e-12)
+
+
 def test_no_fin_along_a_wall_goes_on_past_the_edges_of_few_contacts():
     atlas = core.atlas_of([few_on_box(800)])
     assert atlas.status == "ok"
