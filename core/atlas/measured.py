@@ -339,14 +339,16 @@ def _agreement(
     noise: float,
 ) -> str:
     """How contacts (n,) agree with the surface if there is no doubt; `noise` is that of the fit, or 0."""
-    closed = (
-        f"The surface is closed. All but {np.count_nonzero(far)} of {len(far)} contacts agree with it, "
-        f"which are off by up to {distances[far].max():.2g}, most together around "
-        f"{place_text(contacts.points[worst[:1]])}."
-        if far.any()
-        else "The surface is closed, and all contacts agree with it."
-    )
-    return closed + (f" No noise was given; that of the fit is {noise:.2g}." if noise else "")
+    message = "The surface is closed, and all contacts agree with it."
+    if far.any():
+        message = (
+            f"The surface is closed. All but {np.count_nonzero(far)} of {len(far)} contacts agree with it, "
+            f"which are off by up to {distances[far].max():.2g}, most together around "
+            f"{place_text(contacts.points[worst[:1]])}."
+        )
+    if noise:
+        message += f" No noise was given; that of the fit is {noise:.2g}."
+    return message
 
 
 class _Cloud(NamedTuple):
