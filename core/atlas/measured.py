@@ -362,13 +362,15 @@ class _Cloud(NamedTuple):
     def enclosing(
         self, points: Array, normals: Array, most: float, sheets: Array
     ) -> tuple[Array, Array, Array, Indices]:
-        """How far places (n, 3) with normals (n, 3) are above what the nearest contacts enclose, (n,).
+        """The planes by which contacts near places (n, 3) with normals (n, 3) enclose the object there.
 
-        Before it the normals of contacts whose planes do so around a convex edge, (n, k, 3), and how far
-        above these the places are, (n, k); 0 elsewhere. The first contact, (n,), faces alike, if any does.
-        Where others are around a convex edge a place is behind their planes, too, and before one of them
-        around a concave edge. So the foot of an edge that is cut off is on its wall, and a fin along one wall
-        is off the other. Contacts agree with a patch that faces as they do.
+        Around a convex edge a place is behind the planes of the nearest contacts, and around a concave edge
+        before one of them. So the foot of an edge that is cut off is on its wall, and a fin along one wall is
+        off the other. Contacts agree with a patch that faces as they do.
+
+        Returns the normals (n, k, 3) of those contacts whose planes enclose, and how far above these planes
+        the places are, (n, k), 0 for other contacts; how far above what is enclosed they are, (n,); and the
+        first contact of each place, (n,), which faces alike if any does.
 
         most : planes that a contact is in front of by more than CONTRADICTED of this length enclose nothing
         sheets : (n, 3), normals of the patches that the places are on, or 0
