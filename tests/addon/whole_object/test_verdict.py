@@ -70,6 +70,21 @@ def test_a_cube_is_a_cube_with_sharp_edges(empty, extension):
     assert lengths.sum() == pytest.approx(24.0, abs=1e-3)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(("turns", "most"), [((0.0, 0.0, 0.0), 6), ((0.3, 0.5, 0.7), 30)])
+def test_limited_dissolve_leaves_few_faces_of_a_cube(empty, turns, most):
+    import bmesh
+
+    empty.ops.mesh.primitive_cube_add(size=2.0, rotation=turns)
+    surface, _ = touched(empty)
+    mesh = bmesh.new()
+    mesh.from_mesh(surface.data)
+    everything = {"verts": mesh.verts[:], "edges": mesh.edges[:]}
+    bmesh.ops.dissolve_limit(mesh, angle_limit=np.radians(1.0), use_dissolve_boundaries=False, **everything)
+    assert 6 <= len(mesh.faces) <= most
+    mesh.free()
+
+
 def test_growing_patches_are_above_the_mesh_and_each_other(empty, extension, touches_of):
     """In the plane of a face, patches would be hidden by it, and by each other."""
     empty.ops.mesh.primitive_cube_add()
