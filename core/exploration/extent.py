@@ -139,17 +139,15 @@ class Touch:
         one of these is fitted, the one of the least roughness per squared length.
         """
         tried: list[Exploration] = []
-        rough: list[tuple[float, tuple[float, int]]] = []
-        error = None
+        rough: dict[tuple[float, int], float] = {}
         for rung in self._rungs():
             roughness = self._roughness(rung)
             if roughness > ROUGH:
-                rough.append((roughness / math.prod(rung), rung))
+                rough[rung] = roughness / math.prod(rung)
                 continue
             try:
                 explored = yield from self._felt(*rung)
-            except DegenerateCurvesError as why:
-                error = error or why
+            except DegenerateCurvesError:
                 continue
             if _is_sure(explored, self.options):
                 explored = self._with_taps(explored)
@@ -160,12 +158,11 @@ class Touch:
                 break
         if rough or not tried:
             longest = self.farthest / MOST_CONTACTS, MOST_CONTACTS
-            _, rung = min(rough, key=lambda pair: pair[0], default=(0.0, longest))
             try:
-                tried.append((yield from self._felt(*rung)))
-            except DegenerateCurvesError as why:
+                tried.append((yield from self._felt(*min(rough, key=rough.__getitem__, default=longest))))
+            except DegenerateCurvesError:
                 if not tried:
-                    raise error or why from None
+                    raise
         return self._most_certain(tried)
 
     def _most_certain(self, tried: list[Exploration]) -> Exploration:
