@@ -103,7 +103,7 @@ def test_an_empty_collection_of_patches_is_removed_if_undo_can_bring_its_links_b
         outer.children.link(collection)
         empty.context.scene.collection.children.unlink(collection)
     elif use == "instanced":
-        empty.data.objects["Sphere"].instance_collection = collection
+        empty.data.objects.new("Instance", None).instance_collection = collection
     deleted = extension.tactile_addon.probes.deleted
     for what in ("Probe", "Patch"):
         deleted.remove()
