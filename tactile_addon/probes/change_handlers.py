@@ -15,7 +15,7 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from ..scene import undo
+from ..scene import patch_object, undo
 from ..scene.family import remembered
 from ..scene.viewports import has_gesture
 from ..touch.settings import silent
@@ -34,7 +34,9 @@ _seen = None  # The scene and view layer that were looked at last.
 
 @persistent
 def on_depsgraph_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Brings the patches of outdated live probes up to date. If no input has changed, nothing happens."""
+    """Brings the patches of outdated live probes up to date, and has empty collections of patches removed."""
+    if depsgraph.id_type_updated("COLLECTION") and patch_object.empty_collections():
+        _settle_soon()
     _bring_up_to_date(depsgraph, math.inf)
 
 
@@ -91,7 +93,7 @@ def _look_at(
         update(probe, depsgraph, complete)
     else:
         stand_by(probe, outdated, complete)
-    if not complete and (is_due or is_pending(probe) or anchor.is_carried(probe)):
+    if not complete and (is_due or is_pending(probe) or anchor.is_carried(probe) or deleted.targets):
         _settle_soon()
     return is_due and in_time
 
@@ -111,8 +113,7 @@ def on_other_data(*_: Any) -> None:
     global _unsure
     targets.cache_clear()
     _unsure = True
-    if not bpy.app.background:  # There may be no update otherwise.
-        _settle_soon()
+    _settle_soon()  # There may be no update otherwise.
 
 
 def _concerned(depsgraph: bpy.types.Depsgraph) -> tuple[list[Object], bool]:
@@ -161,15 +162,17 @@ def is_pending(probe: Object) -> bool:
 def _settle_soon() -> None:
     if bpy.app.timers.is_registered(_settle):
         bpy.app.timers.unregister(_settle)
-    bpy.app.timers.register(_settle, first_interval=SETTLE)
+    if not bpy.app.background:  # No timer runs there, and one would keep Blender's module from ending.
+        bpy.app.timers.register(_settle, first_interval=SETTLE)
 
 
 def _settle() -> float | None:
     """Completes the patches of a gesture once it has ended, some at a time; Blender calls it as a timer."""
-    if not targets():
-        return None
     if bpy.app.is_job_running("RENDER") or has_gesture():
         return SETTLE
+    deleted.remove()
+    if not targets():
+        return None
     end = perf_counter() + EVENT_SLICE
     for window in bpy.context.window_manager.windows:
         with bpy.context.temp_override(window=window), remembered(), undo.after_step():
@@ -188,7 +191,6 @@ def after_undo(*_: Any) -> None:
     """Puts back what is still there, and makes the handlers look at all probes."""
     undo.put_back()
     on_other_data()
-    deleted.remove_soon()
 
 
 HANDLERS = {
@@ -210,8 +212,8 @@ def register() -> None:
 
 
 def unregister() -> None:
-    for timer in filter(bpy.app.timers.is_registered, (_settle, deleted.remove)):
-        bpy.app.timers.unregister(timer)
+    if bpy.app.timers.is_registered(_settle):
+        bpy.app.timers.unregister(_settle)
     for name, handler in HANDLERS.items():
         with suppress(ValueError):  # Another script may have removed it.
             getattr(bpy.app.handlers, name).remove(handler)

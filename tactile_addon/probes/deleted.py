@@ -1,18 +1,19 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What was deleted beneath a probe, and what undo brings back."""
+"""What was deleted beneath a probe or with patches, and what undo brings back."""
+
+from typing import Any
 
 import bpy
 
-from ..scene.viewports import has_gesture
+from ..scene import patch_object
 from ..touch.settings import silent
 from ..touch.types import Object
 from . import anchor
 
 # Datablocks that drop a deleted object by themselves.
 WINDOW_DATA = bpy.types.Scene | bpy.types.Screen | bpy.types.WindowManager | bpy.types.WorkSpace
-LATER = 0.25  # The seconds after which it is checked again whether a gesture has ended.
-_deleted: set[int] = set()  # The session_uids of deleted targets.
+targets: set[int] = set()  # The session_uids of deleted targets, until `remove`.
 
 
 def forget_target(probe: Object) -> None:
@@ -35,9 +36,7 @@ def forget_target(probe: Object) -> None:
     if anchor.is_attached(probe):  # The object is in no scene any more.
         anchor.attach(probe, None)
     settings.property_unset("target")
-    if not target.users:
-        _deleted.add(target.session_uid)
-        remove_soon()
+    targets.add(target.session_uid)
 
 
 def _follow(probe: Object, target: Object) -> None:
@@ -62,13 +61,6 @@ def _source(obj: Object) -> Object:
     return obj if obj.override_library is None else obj.override_library.reference
 
 
-def remove_soon() -> None:
-    """Calls `remove` later in a window, because a handler may not delete what is being evaluated."""
-    # Without a window no timer runs, and a registered one keeps Blender's module from ending.
-    if not bpy.app.background and not bpy.app.timers.is_registered(remove):
-        bpy.app.timers.register(remove)
-
-
 def relink(probe: Object) -> None:
     """Makes the probe point again to the target that it lost, if undo has brought that back."""
     settings = probe.tactile_probe
@@ -83,17 +75,16 @@ def relink(probe: Object) -> None:
             anchor.attach(probe, target)
 
 
-def remove() -> float | None:
-    """Removes the targets that were deleted if nobody uses them; Blender calls it as a timer."""
-    if has_gesture():
-        return LATER
-    there = {obj.session_uid: obj for obj in bpy.data.objects}
-    gone = [there[number] for number in _deleted if number in there and not there[number].users]
-    # Children and modifiers point to an object without being its users. Undo may leave them as they are, and
-    # would then bring back the object, but not these links.
+def remove() -> None:
+    """Removes deleted targets and empty collections if nobody uses them.
+
+    A timer calls it, because a handler may not delete what is being evaluated.
+    """
+    gone: list[Any] = [o for o in bpy.data.objects if o.session_uid in targets and not o.users]
+    gone += patch_object.empty_collections()
+    # Children, modifiers and collections point to an object or a collection. Undo may leave them as they are,
+    # and would then bring that back, but not these links. A scene it brings back, because its objects differ.
     pointing = bpy.data.user_map(subset=gone) if gone else {}
-    gone = [obj for obj in gone if all(isinstance(user, WINDOW_DATA) for user in pointing.get(obj, ()))]
-    _deleted.clear()
-    for obj in gone:
-        bpy.data.objects.remove(obj)
-    return None
+    gone = [block for block in gone if all(isinstance(user, WINDOW_DATA) for user in pointing.get(block, ()))]
+    targets.clear()
+    bpy.data.batch_remove(gone)

@@ -216,7 +216,7 @@ class AllOver(InSlices):
 
     meanwhile = {"PASS_THROUGH"}  # The scene may change, because a detached mesh is touched.
     _estimate: Callable[[bpy.types.Context, Object], str]
-    _known: tuple[Any, str] = (None, "")  # What was estimated last, after what it depends on.
+    _known: tuple[Any, str] = ((), "")  # What was estimated last, after what it depends on.
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         try:
@@ -231,8 +231,9 @@ class AllOver(InSlices):
         """A sentence on what it will take with these settings, made once: a dialog is drawn often."""
         target = target_object(context, self.target)
         mesh = target.evaluated_get(context.evaluated_depsgraph_get()).data
-        vertices = len(getattr(mesh, "vertices", ()))  # A modifier may have been added.
-        given = target.session_uid, vertices, *(getattr(self, name) for name in self.shown)
+        shape = target.session_uid, len(getattr(mesh, "vertices", ()))  # A modifier may have been added.
+        given = *shape, *(getattr(self, name) for name in self.shown)
+        self._is_reshaped = self._known[0][:2] != shape
         if given != self._known[0]:
             self._known = given, self._estimate(context, target)
         return self._known[1]

@@ -28,6 +28,7 @@ may differ afterward.
 """
 
 from functools import cache
+from typing import Any
 
 import bpy
 from bpy.props import (
@@ -41,12 +42,24 @@ from bpy.props import (
 
 from ..scene import patch_object, patch_record, shown
 from ..scene.family import children_of
-from ..touch.settings import OVERRIDABLE, TouchSettings, changed, silent
+from ..touch.settings import KEPT, OVERRIDABLE, FitSettings, TouchSettings, changed, silent
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object
 from . import anchor
 
 DIGEST = "tactile_digest"
+
+
+def _used(name: str) -> Any:
+    """A property that is the setting `name` or, if that is left to the surface, what the last touch chose."""
+    like = (TouchSettings.__annotations__ | FitSettings.__annotations__)[name]
+    # The override of a library's probe would keep a number that was chosen as one that was given.
+    return like.function(
+        **{key: value for key, value in like.keywords.items() if key not in KEPT},
+        options=set(),
+        get=lambda settings: getattr(settings, name) or (record_of(settings.id_data) or {}).get(name, 0),
+        set=lambda settings, value: setattr(settings, name, value),
+    )
 
 
 class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
@@ -81,6 +94,9 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
         default=True,
         override=OVERRIDABLE,
     )
+    used_extent: _used("extent")
+    used_step: _used("step")
+    used_degree: _used("degree")
     active_plane: IntProperty(
         name="Active Plane",
         description="The plane that has a handle to tilt it",

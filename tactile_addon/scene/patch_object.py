@@ -73,7 +73,12 @@ def remove_objects(objects: Sequence[Object]) -> None:
     materials = {material for mesh in meshes for material in mesh.materials if material is not None}
     bpy.data.batch_remove(meshes)
     bpy.data.batch_remove([material for material in materials if not material.users])
-    bpy.data.batch_remove([c for c in bpy.data.collections if _is_own(c) and not (c.objects or c.children)])
+    bpy.data.batch_remove(empty_collections())
+
+
+def empty_collections() -> list[bpy.types.Collection]:
+    """The collections of patches that have nothing in them."""
+    return [c for c in bpy.data.collections if _is_own(c) and not (c.objects or c.children)]
 
 
 def _is_own(collection: bpy.types.Collection) -> bool:

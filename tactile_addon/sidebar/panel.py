@@ -23,7 +23,6 @@ from ..touch.touch_report import TouchReport
 from ..touch.types import Object, PanelMixin
 from ..touch.wording import (
     curvatures,
-    found_values,
     main_rows,
     other_rows,
     plane_rows,
@@ -78,18 +77,17 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         move.operator("tactile.pick", text="Move", icon="EYEDROPPER")
         row.operator("tactile.pick", text="New", icon="ADD").new = True
         row.operator("tactile.delete", text="", icon="TRASH")
-        settings, record = found.tactile_probe, probe.record_of(found)
+        settings = found.tactile_probe
         layout.prop(settings, "target")
-        chosen = found_values(record)
-        draw_chosen(layout, settings, "extent", chosen)
+        draw_chosen(layout, settings, "extent")
         _draw_planes(context, layout, settings)
         row = layout.row()
         row.prop(settings, "live", text="Live" if settings.live else "Live (Frozen)")
         row.operator("tactile.update", text="", icon="FILE_REFRESH")
         if body := _folded(layout, "fit", "Sensor and Fit"):
-            draw_chosen(body, settings, "step", chosen)
+            draw_chosen(body, settings, "step")
             draw_noise(body, settings)
-            draw_fit(body, settings, chosen)
+            draw_fit(body, settings)
 
 
 def _folded(layout: bpy.types.UILayout, identifier: str, title: str) -> bpy.types.UILayout | None:
@@ -148,8 +146,7 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
             return
         is_outdated = record["status"] == "outdated"
         if not (is_outdated and failed):  # The failure stands above already.
-            words, icon = verdict(record), ICONS.get(record["status"], "ERROR")
-            draw_sentence(context, layout, words, icon, in_two=True)
+            draw_sentence(context, layout, verdict(record), ICONS.get(record["status"], "ERROR"), in_two=True)
         draw_rows(context, layout, main_rows(record), active=not is_outdated)
         _draw_colors(context, layout, patch, "tactile_colors")
         _draw_shown(layout, found, patch)
@@ -224,10 +221,9 @@ class TACTILE_PT_probes(_Sidebar, bpy.types.Panel):
         column = layout.column(align=True)
         probes: list[Object] = [each for each in context.view_layer.objects if probe.is_probe(each)]
         for found in sorted(probes, key=lambda each: each.name):
-            record, words = probe.record_of(found), found.tactile_probe.message
+            record = probe.record_of(found)
             icon: Any = "ERROR" if record is None else ICONS.get(record["status"], "ERROR")
-            if record is not None:
-                words = curvatures(record)
+            words = found.tactile_probe.message if record is None else curvatures(record)
             text, is_active = f"{found.name}   {words}", found == probe.probe_of(obj)
             column.operator(
                 "tactile.activate", text=text, icon=icon, depress=is_active, translate=False

@@ -3,11 +3,9 @@
 """The settings of a touch, which operators and probes have in common."""
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
 from ... import core
@@ -183,18 +181,13 @@ def touch_arguments(settings: Any) -> dict[str, Any]:
     }
 
 
-def draw_chosen(
-    layout: bpy.types.UILayout, settings: Any, name: str, found: Mapping[str, str] | None = None
-) -> None:
-    """Draws a setting; the label of a number that the surface chooses has the value that was `found`."""
+def draw_chosen(layout: bpy.types.UILayout, settings: Any, name: str) -> None:
+    """Draws a setting; of a number that is left to the surface, the one in use, if that can be changed."""
     if getattr(settings, name) or name not in AUTO:
         layout.prop(settings, name)
-    elif found and found.get(name):
-        row = layout.row()
-        row.use_property_split = False  # The label takes the width it needs.
-        row.prop(settings, name, text=f"{iface(AUTO[name])} {found[name]}", translate=False)
     else:
-        layout.prop(settings, name, text=AUTO[name])
+        is_used = hasattr(settings, f"used_{name}") and settings.id_data.override_library is None
+        layout.prop(settings, f"used_{name}" if is_used else name, text=AUTO[name])
 
 
 def draw_noise(layout: bpy.types.UILayout, settings: Any) -> None:
@@ -204,10 +197,10 @@ def draw_noise(layout: bpy.types.UILayout, settings: Any) -> None:
         layout.prop(settings, "seed")
 
 
-def draw_fit(layout: bpy.types.UILayout, settings: Any, found: Mapping[str, str] | None = None) -> None:
-    """Draws the rows of the method and of its options; `found` as in draw_chosen."""
+def draw_fit(layout: bpy.types.UILayout, settings: Any) -> None:
+    """Draws the rows of the method and of its options."""
     layout.prop(settings, "method")
-    draw_chosen(layout, settings, "degree", found)
+    draw_chosen(layout, settings, "degree")
     if settings.method in ("tagc", "quadratic-variation"):
         layout.prop(settings, "weight")
 

@@ -59,7 +59,9 @@ def say(value: float, power: int, unit: Unit, std: float | None = None) -> str:
     if std is None:
         return f"{_digits(value / scale)} {symbol(power, unit)}".strip()
     value, spread = known(value / scale, std / scale), float(f"{std / scale:.1g}")
-    return f"{_digits(value)} ± {_digits(spread)} {symbol(power, unit)}".strip()
+    # Both have the same decimals.
+    digits = f".{max(_decimals(spread), 0)}f" if PLAIN <= spread < 1.0 / PLAIN else ".3g"
+    return f"{value:{digits}} ± {spread:{digits}} {symbol(power, unit)}".strip()
 
 
 def _digits(number: float) -> str:
@@ -77,7 +79,12 @@ def known(value: float, std: float) -> float:
     """The value, rounded to the place of the first digit of its standard deviation."""
     if not 0.0 < std < math.inf:
         return value
-    return round(value, -int(f"{std:.0e}".partition("e")[2])) + 0.0  # -0.0 + 0.0 is 0.0.
+    return round(value, _decimals(std)) + 0.0  # -0.0 + 0.0 is 0.0.
+
+
+def _decimals(std: float) -> int:
+    """How many decimals it takes to the first digit of a standard deviation; below 0 before the point."""
+    return -int(f"{std:.0e}".partition("e")[2])
 
 
 def length(value: float) -> str:

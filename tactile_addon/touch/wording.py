@@ -273,17 +273,6 @@ def plane_rows(record: TouchReport) -> list[tuple[str, str]]:
     ]
 
 
-def found_values(record: Mapping[str, Any] | None) -> dict[str, str]:
-    """The values that the last touch chose for numbers left to the surface, in words and by name."""
-    if record is None or record["status"] == "outdated" or "step" not in record:
-        return {}
-    return {
-        "extent": say_of(record, record["extent"]),
-        "step": say_of(record, record["step"]),
-        "degree": str(record["degree"]),
-    }
-
-
 def _radii(record: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Rows of the radii 1 / kappa, with their deviations, if the curvatures are known not to be 0."""
     for number in (1, 2):

@@ -18,7 +18,7 @@ from ..touch.settings import MOST_PLANES, STEEPEST
 from ..touch.surface import MeshSurface
 from ..touch.touch_object import plane_axes
 from ..touch.types import Object, Outcome
-from .mouse import draw_hints, line_of_sight, mouse_ray
+from .mouse import draw_hints, line_of_sight, mouse_ray, place_of
 
 DRAG_TURN, DRAG_TILT, DRAG_EXTENT, POINT = "TURN", "TILT", "EXTENT", "POINT"
 # If the sine of the angle between view and plane is less, nothing can be dragged in the plane, or not well.
@@ -90,7 +90,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
 
     def _take_rim(self, context: bpy.types.Context, event: bpy.types.Event) -> None:
         """Lets the mouse drag the rim of the patch where that is nearest, in the plane across the normal."""
-        origin, direction = mouse_ray(context.region, context.region_data, event)
+        origin, direction = mouse_ray(context.region, context.region_data, place_of(event))
         patch = probe.patch_near(context.object)
         rim = [patch.matrix_world @ Vector(place) for place in np.reshape(patch[CURVES]["rim"][0], (-1, 3))]
         nearest = min(rim, key=lambda place: (place - origin).cross(direction).length)
@@ -131,7 +131,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
 
     def _slide(self, context: bpy.types.Context, event: bpy.types.Event) -> None:
         """Puts the probe on the surface below the mouse, and turns it as the normal turns."""
-        origin, direction = mouse_ray(context.region, context.region_data, event)
+        origin, direction = mouse_ray(context.region, context.region_data, place_of(event))
         depsgraph = context.evaluated_depsgraph_get()
         space: Any = context.space_data
         try:
@@ -152,7 +152,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
 
     def _below(self, context: bpy.types.Context, event: bpy.types.Event) -> float | None:
         """The angle of the mouse, or its distance from the point; None on the point and edge-on."""
-        origin, direction = mouse_ray(context.region, context.region_data, event)
+        origin, direction = mouse_ray(context.region, context.region_data, place_of(event))
         center, normal = self._center, self._matrix.col[2].xyz.normalized()
         e1 = self._matrix.col[0].xyz.normalized()
         right, up = e1, normal.cross(e1)

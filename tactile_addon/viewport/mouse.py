@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is below the mouse: viewport, line into the scene and mesh; and hints on what its buttons do."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import bpy
@@ -24,32 +24,37 @@ def draw_hints(layout: bpy.types.UILayout, hints: Iterable[tuple[Any, str]]) -> 
         layout.label(text=f" {text}")  # Icons of words, such as Esc, reach to the right.
 
 
+def place_of(event: bpy.types.Event) -> tuple[int, int]:
+    """The place of the mouse in the window, in pixels."""
+    return event.mouse_x, event.mouse_y
+
+
 def is_over(region: bpy.types.Region, x: float, y: float) -> bool:
     """Whether a place of the window, in pixels, is in a region."""
     return 0 <= x - region.x < region.width and 0 <= y - region.y < region.height
 
 
 def viewport_below(
-    context: bpy.types.Context, event: bpy.types.Event
+    context: bpy.types.Context, mouse: Sequence[float]
 ) -> tuple[Any, bpy.types.Region, Any] | None:
-    """(space, region, view) of the 3D viewport below the mouse, or None if it is over anything else."""
+    """(space, region, view) of the 3D viewport at a place of the window, or None if that is anything else."""
     for area in context.screen.areas:
-        inside = [region for region in area.regions if is_over(region, event.mouse_x, event.mouse_y)]
+        inside = [region for region in area.regions if is_over(region, *mouse)]
         if area.type == "VIEW_3D" and inside and all(region.type == "WINDOW" for region in inside):
             return area.spaces.active, inside[0], inside[0].data
     return None
 
 
 def mouse_ray(
-    region: bpy.types.Region, view: bpy.types.RegionView3D, event: bpy.types.Event
+    region: bpy.types.Region, view: bpy.types.RegionView3D, mouse: Sequence[float]
 ) -> tuple[Vector, Vector]:
-    """(origin, direction) of the line below the mouse in a viewport, in the world.
+    """(origin, direction) of the line below a place of the window in a viewport, in the world.
 
     The functions of view3d_utils invert the whole projection. This does not, because it would be off by many
     pixels if the clipping range is a million times as long as what is seen.
     """
-    x = 2.0 * (event.mouse_x - region.x) / region.width - 1.0
-    y = 2.0 * (event.mouse_y - region.y) / region.height - 1.0
+    x = 2.0 * (mouse[0] - region.x) / region.width - 1.0
+    y = 2.0 * (mouse[1] - region.y) / region.height - 1.0
     window: Any = view.window_matrix
     to_world: Any = view.view_matrix.inverted()
     if view.is_perspective:
@@ -70,24 +75,22 @@ def line_of_sight(view: bpy.types.RegionView3D, point: Vector) -> Vector:
 def large_meshes(context: bpy.types.Context) -> set[str]:
     """Names of the visible objects whose first touch takes a noticeable time."""
     depsgraph = context.evaluated_depsgraph_get()
-    meshes: Iterator[Object] = (
-        obj for obj in context.view_layer.objects if obj.type == "MESH" and obj.visible_get()
-    )
-    return {obj.name for obj in meshes if len(obj.evaluated_get(depsgraph).data.polygons) > MANY_FACES}
+    visible: list[Object] = [obj.evaluated_get(depsgraph) for obj in context.visible_objects]
+    return {o.name for o in visible if o.type == "MESH" and len(o.data.polygons) > MANY_FACES}
 
 
 def point_below(
-    context: bpy.types.Context, event: bpy.types.Event
+    context: bpy.types.Context, mouse: Sequence[float]
 ) -> tuple[Object, list[float], Vector] | None:
-    """(object, location, direction toward the eye) of the mesh below the mouse, or None if there is none.
+    """(object, location, direction toward the eye) of the mesh at a place of the window, or None.
 
     Raises ValueError for an object that cannot be touched.
     """
-    viewport = viewport_below(context, event)
+    viewport = viewport_below(context, mouse)
     if viewport is None:
         return None
     space, region, view = viewport
-    eye, direction = mouse_ray(region, view, event)
+    eye, direction = mouse_ray(region, view, mouse)
     # An orthographic view also shows what is behind its origin.
     start = eye if view.is_perspective else eye - space.clip_end * direction
     depsgraph = context.evaluated_depsgraph_get()

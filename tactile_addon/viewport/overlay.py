@@ -8,18 +8,20 @@ from typing import Any
 
 import blf
 import bpy
+import gpu
 import numpy as np
+from mathutils import Vector
 
 from ..probes import probe
 from ..scene import colors, patch_record
-from ..scene.mesh_data import REASON
+from ..scene.mesh_data import DEVIATION, REASON
 from ..scene.viewports import shows_colors
 from ..stability_map import map_object
 from ..touch import units
 from ..touch.touch_object import plane_axes
 from ..touch.types import Object
 from .above import draw_above
-from .curves import FONT, PLANE_COLORS, WHITE, draw_curves, draw_letters, draw_preview, draw_shape
+from .curves import BLACK, FONT, PLANE_COLORS, WHITE, draw_curves, draw_letters, draw_preview, draw_shape
 from .drag import DRAG_TILT, DRAG_TURN
 from .free_view import free_strip
 from .mouse import is_over
@@ -27,6 +29,7 @@ from .mouse import is_over
 TEXT = 11.0  # The font's size in panels.
 LEGEND_STEPS = 65  # The number of colors of the legend's bar.
 LETTERS, OFFSET = 48, 16  # The letters in a line of words near the mouse, and the pixels between them.
+DOT = 10.0  # The size of a dot, in pixels at scale 1.
 BAR = (150, 12)  # Width and height of the legend's bar, in pixels at resolution scale 1,
 BESIDE = 195  # and the width that it needs beside the last operator's panel.
 
@@ -82,6 +85,17 @@ def draw_plane() -> None:
     corners = [origin + size * (a * t + b * up) for a, b in ((-1, -0.6), (1, -0.6), (-1, 0.6), (1, 0.6))]
     strip = {"pos": np.array(corners).tolist()}
     draw_shape("TRI_STRIP", "UNIFORM_COLOR", strip, color=(*PLANE_COLORS[number], 0.18))
+
+
+def draw_farthest() -> None:
+    """Draws a dot where the active whole object is farthest off its mesh, if its colors show deviations."""
+    obj = _active(bpy.context)
+    record = {} if obj is None else obj.get(patch_record.ATLAS_RECORD, {})
+    if "deviation_place" in record and obj.tactile_colors == DEVIATION and obj.visible_get():
+        place = obj.matrix_world @ Vector(np.subtract(record["deviation_place"], record["origin"]))
+        for share, color in ((1.0, BLACK), (0.6, WHITE)):
+            gpu.state.point_size_set(share * DOT * bpy.context.preferences.system.ui_scale)
+            draw_shape("POINTS", "POINT_UNIFORM_COLOR", {"pos": [place]}, color=color)
 
 
 def draw_legend() -> None:
@@ -213,6 +227,7 @@ DRAWINGS = (
     (draw_above, "POST_VIEW"),
     (draw_curves, "POST_VIEW"),
     (draw_plane, "POST_VIEW"),
+    (draw_farthest, "POST_VIEW"),
     (draw_letters, "POST_PIXEL"),
     (draw_legend, "POST_PIXEL"),
 )

@@ -33,7 +33,7 @@ from ..touch.touch_object import Touched, touch
 from ..touch.types import Object, Outcome
 from ..touch.wording import curvatures, sentence, verdict
 from . import overlay
-from .mouse import draw_hints, large_meshes, point_below
+from .mouse import draw_hints, large_meshes, place_of, point_below
 
 NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NDOF", "NUMPAD", "MOUSEROTATE", "MOUSESMARTZOOM", "HOME")
 HINTS = (
@@ -67,6 +67,10 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         default=True,
     )
 
+    # Where the mouse came last, if nothing can have moved it since: a busy Blender hears of a click late, and
+    # takes it to be where the mouse is by then.
+    _mouse: tuple[int, int] | None = None
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return is_in_object_mode(cls, context, "Points are picked") and has_mesh(cls, context)
@@ -90,9 +94,9 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         context.window.cursor_modal_set("EYEDROPPER")
         context.workspace.status_text_set(lambda header, _: draw_hints(header.layout, HINTS))
         if self.at_once:
-            return self._press(context, event)
+            return self._press(context, place_of(event))
         context.window_manager.modal_handler_add(self)
-        self._hover(context, event)
+        self._hover(context, place_of(event))
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
@@ -100,16 +104,18 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
             self.cancel(context)
             return {"CANCELLED"}
         if event.type.startswith(NAVIGATION) or (event.type == "LEFTMOUSE" and event.alt):
+            self._mouse = None
             return {"PASS_THROUGH"}
         if event.type == "MOUSEMOVE":
-            self._hover(context, event)
+            self._mouse = place_of(event)
+            self._hover(context, self._mouse)
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
-            return self._press(context, event)
+            return self._press(context, self._mouse or place_of(event))
         return {"RUNNING_MODAL"}
 
-    def _press(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
+    def _press(self, context: bpy.types.Context, mouse: tuple[int, int]) -> Outcome:
         """Makes the probe below the mouse; where no touch is possible, a pick goes on and the tool ends."""
-        words = self._hover(context, event)
+        words = self._hover(context, mouse)
         touched = self._seen["touched"]
         if touched is None and not self.at_once:
             self._seen["refusal"] = words
@@ -191,7 +197,7 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
             if not self.properties.is_property_set(name):
                 setattr(self, name, value)
 
-    def _hover(self, context: bpy.types.Context, event: bpy.types.Event) -> str:
+    def _hover(self, context: bpy.types.Context, mouse: tuple[int, int]) -> str:
         """Touches below the mouse for the preview, and returns what there is to say of it.
 
         The header has no room for a sentence, so a refusal is drawn next to the mouse.
@@ -199,9 +205,9 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         words = short = "Move over a mesh to touch it"
         if self._large:  # Blender builds trees of their faces then.
             short += f" (the first touch of {', '.join(sorted(self._large))} takes a while)"
-        self._seen |= {"touched": None, "refusal": None, "mouse": (event.mouse_x, event.mouse_y)}
+        self._seen |= {"touched": None, "refusal": None, "mouse": mouse}
         try:
-            found = point_below(context, event)
+            found = point_below(context, mouse)
             if found is not None:
                 obj, location, eye = found
                 active = context.view_layer.objects.active

@@ -26,12 +26,12 @@ from ..probes.operators import (
     target_object,
 )
 from ..scene import patch_record
-from ..scene.mesh_data import DEVIATION, own_mesh, values
+from ..scene.mesh_data import DEVIATION, values
 from ..touch import units
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.evaluated_mesh import read_array
 from ..touch.settings import NOISE, UNSAVED, given, length_property
-from ..touch.types import Object, Outcome, Point
+from ..touch.types import Object, Outcome
 from . import whole_mesh
 from .both_ways import DIRECTIONS, LIFT, THIN_SHARE
 from .object_report import FACETED, deviation, object_summary
@@ -182,7 +182,6 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
     edge: EDGE
 
     shown = ("target", "accuracy", "tolerance", "edge", "noise")
-    _shape: tuple[int, int] | None = None  # What is in `_mesh`: the object and the number of its vertices.
     _warnings: Sequence[str] = ()
     _is_faceted = False  # Whether touches would feel the facets of the object one by one.
 
@@ -212,10 +211,8 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
 
     def _estimate(self, context: bpy.types.Context, target: Object) -> str:
         """A sentence on the tolerance, the touches and the seconds. The mesh is kept until it changes."""
-        depsgraph = context.evaluated_depsgraph_get()
-        vertices = target.evaluated_get(depsgraph).data.vertices if target.type == "MESH" else ()
-        if (target.session_uid, len(vertices)) != self._shape:
-            self._mesh, self._shape = DetachedMesh(target, depsgraph), (target.session_uid, len(vertices))
+        if self._is_reshaped:
+            self._mesh = DetachedMesh(target, context.evaluated_depsgraph_get())
         tolerance = self.tolerance or tolerance_of(self._mesh.size, self.accuracy, self.noise)
         touches, seconds, share, wall = expected(self._mesh, tolerance, self.noise)
         self._is_faceted = share >= FACETED
@@ -254,8 +251,8 @@ class TACTILE_OT_look_farthest(bpy.types.Operator):
         patch_record.require_colored(obj)
         record = obj[patch_record.ATLAS_RECORD].to_dict()
         place = Vector(np.subtract(record["deviation_place"], record["origin"]))
-        own_mesh(obj)
-        nearest = _select_nearest(obj.data, place)
+        off = read_array(obj.data.vertices, "co", 3) - np.array(place)
+        nearest = obj.data.vertices[int(np.argmin((off**2).sum(axis=1)))]
         largest, there = record["deviation_max"], abs(values(obj.data, DEVIATION)[nearest.index])
         is_reached = there >= REACHED * largest or largest <= record["edge"]
         make_active(context, obj)
@@ -268,19 +265,9 @@ class TACTILE_OT_look_farthest(bpy.types.Operator):
             view.view_rotation = (turn @ sight).to_track_quat("Z", "Y")
             view.view_distance = SEEN * record["size"] * obj.matrix_world.median_scale
         obj.tactile_colors = DEVIATION
-        off, source = deviation(record, "max"), record["source"]
         reach = "" if is_reached else ", which does not reach it"
-        return report_done(self, f'Here "{source}" is {off} off the surface{reach}')
-
-
-def _select_nearest(mesh: bpy.types.Mesh, place: Point) -> Any:
-    """Selects the vertex nearest to a place, and nothing else, and returns it."""
-    nearest = int(np.argmin(((read_array(mesh.vertices, "co", 3) - np.array(place)) ** 2).sum(axis=1)))
-    for parts in (mesh.vertices, mesh.edges, mesh.polygons):
-        parts.foreach_set("select", np.zeros(len(parts), dtype=bool))
-    mesh.vertices[nearest].select = True
-    mesh.update()
-    return mesh.vertices[nearest]
+        largest = deviation(record, "max")
+        return report_done(self, f'Here "{record["source"]}" is {largest} off the surface{reach}')
 
 
 def _free_sight(seen: Object, vertex: Any, far: float) -> Vector:

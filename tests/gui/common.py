@@ -82,6 +82,21 @@ def picture_of_docs(name):
     check(f"{file.name} is small", file.stat().st_size < MOST_BYTES, file.stat().st_size)
 
 
+def drag(start, end, steps=4):
+    """Drags with the mouse, and waits after each step until Blender has heard of it.
+
+    Blender takes a button to be where the mouse is by then, so a drag during a busy second is a click.
+    """
+    for args in (("mousemove", *start), ("mousedown", 1)):
+        gui.xdo(*args)
+        yield 0.3
+    for i in range(1, steps + 1):
+        gui.xdo("mousemove", *(round(a + (b - a) * i / steps) for a, b in zip(start, end, strict=True)))
+        yield 0.3
+    gui.xdo("mouseup", 1)
+    yield 1
+
+
 def probe():
     return next((o for o in bpy.data.objects if o.type == "EMPTY" and o.tactile_probe.is_probe), None)
 

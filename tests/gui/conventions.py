@@ -21,6 +21,7 @@ from common import (
     check,
     consistent,
     data_blocks,
+    drag,
     handle,
     is_complete,
     look,
@@ -116,8 +117,7 @@ def gestures(place):
     check("... and makes no other", sum(obj.type == "EMPTY" for obj in bpy.data.objects) == 1)
     yield from undo_redo("moved by a pick", before)
     before = state()
-    gui.drag(AZIMUTH, (AZIMUTH[0] + 40, AZIMUTH[1]))
-    yield 1
+    yield from drag(AZIMUTH, (AZIMUTH[0] + 40, AZIMUTH[1]))
     yield from until(is_complete)
     check("a number is dragged", probe().tactile_probe.azimuths[0] > 0.05, state())
     consistent("a number dragged")

@@ -5,7 +5,9 @@
 It uses the scan of a pear where there is one, else Suzanne. Its pictures are next to the scene.
 """
 
+import math
 import sys
+import time
 from pathlib import Path
 
 import bpy
@@ -17,6 +19,7 @@ from common import ASIDE, FOLDER, check, extent, is_complete, look, open_tab, pa
 
 SIDE, ACROSS = Vector((0.3, -1.0, 0.25)), 26  # where the view is from, and pixels of two moves
 SLIDES = 12
+BUSY = 1.5  # seconds
 
 
 def target():
@@ -46,6 +49,25 @@ def reports():
     return record["extent"], record["status"], bool(record["is_verified"])
 
 
+def busy_click(place):
+    """A click while Blender is busy makes a probe where the mouse was then, not where it is later."""
+    window, area, region = gui.find()
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.tactile.pick("INVOKE_DEFAULT", new=True)
+    yield 1
+    at = [round(v) for v in gui.view_point(place)]
+    moves = (*("mousemove", at[0] - 40, at[1], "sleep", 0.2, "mousemove", *at, "sleep", 0.2), *("click", 1))
+    gui.xdo(*moves, "sleep", 0.1, "mousemove", at[0] - 60, at[1] + 40)
+    time.sleep(BUSY)
+    yield 1
+    yield from until(is_complete)
+    off = math.dist(gui.view_point(probe().matrix_world.translation), at)
+    check("a click in a busy second is where the mouse was", off < 5, off)
+    bpy.data.objects.remove(patch())
+    bpy.data.objects.remove(probe())
+    yield 1
+
+
 def steps():
     yield from open_tab()
     name = target()
@@ -53,6 +75,7 @@ def steps():
     center, place = below(obj, SIDE)
     look(center, SIDE, 1.6 * max(obj.dimensions))
     yield 1
+    yield from busy_click(place)
     window, area, region = gui.find()
     with bpy.context.temp_override(window=window, area=area, region=region):
         bpy.ops.tactile.pick(target=name, location=place, new=True)

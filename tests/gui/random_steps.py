@@ -30,14 +30,10 @@ taken = []
 
 def is_quiet():
     """Whether no gesture goes on, and no timer of the extension is left."""
-    timers = (
-        sys.modules[f"{ADDON}.probes.change_handlers"]._settle,
-        sys.modules[f"{ADDON}.probes.deleted"].remove,
-    )
+    settle = sys.modules[f"{ADDON}.probes.change_handlers"]._settle
     windows = bpy.context.window_manager.windows
-    return not any(window.modal_operators for window in windows) and not any(
-        map(bpy.app.timers.is_registered, timers)
-    )
+    is_free = not any(window.modal_operators for window in windows)
+    return is_free and not bpy.app.timers.is_registered(settle)
 
 
 def settled():

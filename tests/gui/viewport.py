@@ -19,6 +19,7 @@ from common import (
     ASIDE,
     FOLDER,
     PICK_BUTTON,
+    activate,
     check,
     consistent,
     data_blocks,
@@ -378,6 +379,20 @@ def delete_by_keys():
     yield 1
     names = {kind: [n for n in found if "Patch" in n] for kind, found in data_blocks().items()}
     check("the bin takes probe and patch", not names["objects"] and not names["meshes"], names)
+    gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
+    yield 2
+    activate(probe().name)
+    patch().select_set(True)
+    bpy.ops.ed.undo_push(message="Select both")
+    for when in ("X on both", "... and again after Ctrl Z"):
+        yield from delete_key()
+        kept = [c.name for c in bpy.data.collections if "Patches" in c.name]
+        check(f"{when} leaves no collection", probe() is None and not kept, kept)
+        gui.xdo("key", "ctrl+z")
+        yield 2
+        is_seen = probe() is not None and {probe(), patch()} <= {*bpy.context.view_layer.objects}
+        check("... and Ctrl Z brings both back to where they are seen", is_seen)
+    yield from delete_key()
 
 
 def orthographic_and_tiny():

@@ -187,6 +187,19 @@ def test_a_pick_makes_a_probe_with_its_patch(empty, ball):
     assert np.array(report["axes"])[:, 0] == pytest.approx(axis(probe, 0), abs=1e-4)
 
 
+def test_an_automatic_number_shows_what_was_chosen_and_is_changed_from_there(empty, ball):
+    probe, patch = pick(empty, extent=0.0)
+    settings, chosen = probe.tactile_probe, report_of(patch)
+    for name in ("extent", "step", "degree"):
+        assert getattr(settings, f"used_{name}") == pytest.approx(chosen[name])
+    settings.used_extent = 0.4
+    assert settings.extent == settings.used_extent == pytest.approx(0.4)
+    assert report_of(patch)["extent"] == pytest.approx(0.4)
+    settings.used_extent = 0.0
+    assert settings.extent == 0.0
+    assert settings.used_extent == pytest.approx(chosen["extent"], rel=1e-3)
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize(
     ("location", "normal", "curvatures"),
@@ -505,7 +518,8 @@ def test_without_a_target_the_probe_says_so_and_keeps_its_patch(
         update(empty)
         assert sentence in probe.tactile_probe.message
         if left == SET[1:] and "Sphere" in names(empty):  # the handler itself deletes nothing
-            assert not empty.app.timers.is_registered(deleted.remove)  # timers do not run without a window
+            settle = extension.tactile_addon.probes.change_handlers._settle
+            assert not empty.app.timers.is_registered(settle)  # timers do not run without a window
             deleted.remove()  # as Blender does once it is idle, in a window
         assert names(empty) == left
         assert state_but_status(patch) == before

@@ -90,3 +90,24 @@ def test_another_touch_makes_a_patch_again(empty, there, again):
     assert names(empty) == SET
     assert there("Patch").parent == there("Probe")
     assert there("Probe").tactile_probe.message == ""
+
+
+@pytest.mark.parametrize("use", ["none", "nested", "instanced"])
+def test_an_empty_collection_of_patches_is_removed_if_undo_can_bring_its_links_back(
+    empty, extension, there, use
+):
+    (collection,) = there("Patch").users_collection
+    if use == "nested":  # This collection would be the same before and after, so undo would keep it.
+        outer = empty.data.collections.new("Outer")
+        empty.context.scene.collection.children.link(outer)
+        outer.children.link(collection)
+        empty.context.scene.collection.children.unlink(collection)
+    elif use == "instanced":
+        empty.data.objects.new("Instance", None).instance_collection = collection
+    deleted = extension.tactile_addon.probes.deleted
+    for what in ("Probe", "Patch"):
+        deleted.remove()
+        assert "Tactile Patches" in empty.data.collections
+        empty.data.objects.remove(there(what))
+    deleted.remove()
+    assert ("Tactile Patches" in empty.data.collections) is (use != "none")

@@ -170,9 +170,9 @@ def test_what_rounding_leaves_of_nothing_is_said_to_be_none(extension, empty):
     settings, said = empty.context.scene.unit_settings, extension.tactile_addon.touch.wording
     settings.scale_length, settings.length_unit = 0.001, "MILLIMETERS"
     rows = dict(said.main_rows(RECORD) + said.other_rows(RECORD))
-    assert rows["κ1"] == "0 ± 0.01 1/mm"
+    assert rows["κ1"] == "0.00 ± 0.01 1/mm"
     assert rows["κ2"] == "0.02 ± 0.01 1/mm"
-    assert rows["K Gaussian"] == "0 ± 0.01 1/mm²"
+    assert rows["K Gaussian"] == "0.00 ± 0.01 1/mm²"
     assert rows["Fit Error"] == "0 mm"
 
 
