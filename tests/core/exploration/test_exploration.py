@@ -137,16 +137,6 @@ def test_what_is_too_rough_for_any_fit_to_be_trusted_is_not_fitted(monkeypatch):
     assert len(fits) - few > few
 
 
-@pytest.mark.parametrize("given", [{}, {"noise": 0.02, "rng": 0}, {"largest_std": 0.1}])
-def test_normals_are_rough_only_where_nothing_else_explains_it(monkeypatch, given):
-    """Those of a mesh that has noise, or is off by what a touch may be off, are off by any angle."""
-    felt = []
-    monkeypatch.setattr(extent, "roughness", lambda *rough: felt.append(rough[1]) or 0.0)
-    explore(surfaces.plane(), **given)
-    assert felt
-    assert all(normals.any() == (not given) for normals in felt)
-
-
 def fits_of(monkeypatch, surface, **more):
     """What is found, and the results of the fits that this took."""
     results = []
