@@ -44,6 +44,20 @@ def test_planes_are_added_while_they_help(empty, sheet):
     assert report["contacts"] > three["contacts"]
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_rough_mesh_is_felt_over_many_edges_and_not_on_one_face(empty, seed):
+    empty.ops.mesh.primitive_grid_add(x_subdivisions=99, y_subdivisions=99, size=2.0)
+    mesh, edge = empty.context.object.data, 2.0 / 99
+    co = positions(mesh)
+    co[:, 2] = np.random.default_rng(seed).normal(0.0, 0.12 * edge, len(co))
+    mesh.vertices.foreach_set("co", co.astype(np.float32).ravel())
+    mesh.update()
+    patch, report = made(empty.ops.tactile.reconstruct, target="Grid", location=(0.013, 0.021, 0.0))
+    assert report["status"] == "ok"
+    assert report["radius"] > 10.0 * edge
+    assert np.abs(positions(patch.data)[:, 2]).max() < 0.03 * report["radius"]
+
+
 def test_planes_are_added_until_it_is_good_enough(empty, sheet):
     stds = [plane["height_std"] for plane in reconstruct(empty, extent=0.5, tolerance=0.0)["added_planes"]]
     report = reconstruct(empty, extent=0.5, tolerance=1.001 * stds[0])
