@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import Array
+from ..arguments import SMALLEST, Array
 from ..contours.contour import Contour
 from ..reconstruction.result import Reconstruction
 from ..steps import chunked
@@ -172,7 +172,8 @@ def tabulate(r: Reconstruction, rim: Array, deviations: bool) -> Table:
     half = _half(rim)
     x, y = (axis.ravel() for axis in np.meshgrid(*2 * [np.linspace(-half, half, SIDE)], indexing="ij"))
     at = np.arctan2(y, x) * (AZIMUTHS / (2.0 * np.pi))
-    share = np.hypot(x, y) / np.interp(at, np.arange(AZIMUTHS), rim, period=AZIMUTHS)
+    reach = np.interp(at, np.arange(AZIMUTHS), rim, period=AZIMUTHS)
+    share = np.hypot(x, y) / np.maximum(reach, SMALLEST)  # A rim may end at the point.
     # Farther out a sextic runs away, and the spline would carry that inward.
     pull = r.radius * np.minimum(1.0, KNOTS_WITHIN / np.maximum(share, 1e-9))
     heights = r.height(pull * x, pull * y).reshape(SIDE, SIDE) / r.radius

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import core
-from core.atlas.charts import MARGIN, Charts
+from core.atlas.charts import AZIMUTHS, MARGIN, Charts
 from core.atlas.cubic_spline import SIDE
-from core.atlas.join import charts_of
+from core.atlas.join import charts_of, tabulate
 from tests import solids
 
 BALL = solids.ball()
@@ -33,6 +33,13 @@ def places(count, seed):
     rng = np.random.default_rng(seed)
     ways = rng.normal(size=(count, 3))
     return ways / np.linalg.norm(ways, axis=1, keepdims=True) * rng.uniform(0.5, 1.5, (count, 1))
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_rim_that_ends_at_the_point_has_a_finite_table(results):
+    rim = np.where(np.arange(AZIMUTHS) % 8, 0.9, 0.0)
+    table = tabulate(results[0].result, rim, deviations=True)
+    assert all(np.isfinite(values).all() for values in table)
 
 
 @pytest.mark.parametrize("near", [np.inf, 0.1])
