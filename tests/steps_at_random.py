@@ -231,7 +231,7 @@ def _faults_of(probe):
     faults = []
     addon = sys.modules[type(settings).__module__]
     try:
-        there = addon.reconstruction_of(patch).frame.origin
+        there = addon.patch_record.reconstruction_of(patch).frame.origin
     except ValueError as error:
         if record["status"] == "outdated" and settings.message and not record["is_verified"]:
             return faults  # it was being dragged when nothing could be felt any more
