@@ -128,6 +128,7 @@ def steps():
     write_contacts()
     for obj in list(bpy.data.objects):
         bpy.data.objects.remove(obj)
+    bpy.data.collections.remove(bpy.data.collections["Tactile Patches"])
     gui.xdo("mousemove", 600, 400)
     bpy.ops.ed.undo_push(message="Empty")
     data = data_blocks()
@@ -138,7 +139,7 @@ def steps():
     check("File, Import, Contact Data makes a patch", good, data_blocks())
     gui.xdo("key", "ctrl+z")
     yield 0.5
-    check("Ctrl Z takes the patch and all its data away", data_blocks() == data, data_blocks())
+    check("Ctrl Z takes the patch and all its data away", data_blocks() == data, (data, data_blocks()))
 
     drop("contacts.csv")
     yield 1
