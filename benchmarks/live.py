@@ -46,6 +46,8 @@ def sheet(bpy, faces):
 def as_in_a_window(addon):
     """Makes updates leave out what takes long, as in a drag; returns the function that ends the gesture."""
     update = addon.probes.touch_again.update
+    # Without a window the second of two callbacks for one angle would end the gesture.
+    addon.probes.change_handlers.is_pending = lambda probe: False
     addon.probes.change_handlers.update = lambda probe, depsgraph, complete: update(
         probe, depsgraph, complete=False
     )
