@@ -104,9 +104,6 @@ PROMISES = [
     ("patch", "off the surface by # of the standard deviation", result.MESH_SHARE),
     ("messages", "Planes less than #° apart", math.degrees(local_geometry.LEAST_ANGLE)),
     ("messages", "within five deviations of it", object_atlas.OFF_STDS / 5),
-    ("messages", "At most # % of the contacts are off", 100 * explained.FEW),
-    ("messages", "none by over a fiftieth of the size, and at most six", 50 * atlas_measured.MOST_OFF),
-    ("messages", "at most six side by side", len(monge.QUADRIC) / 6),
     ("messages", "is half the object's size", 2 * of("tactile_addon/touch/touch_object", "FARTHEST_SHARE")),
     ("messages", "by more than a tenth of its size", 10 * common_point.MAX_OFFSET),
     ("index", "into the window of Blender (# to", of_toml("blender_manifest.toml", "blender_version_min")),
@@ -138,6 +135,7 @@ PROMISES = [
     ("whole_objects", "At most # % of the contacts,", 100 * explained.FEW),
     ("whole_objects", "may be over five times the noise off", object_atlas.OFF_STDS / 5),
     ("whole_objects", "and six side by side,", len(monge.QUADRIC) / 6),
+    ("whole_objects", "none by over a fiftieth of the size", 50 * atlas_measured.MOST_OFF),
     ("whole_objects", "An edge sharper than #° is a crease", round(degrees(curvature.SHARP))),
 ]  # fmt: skip
 
