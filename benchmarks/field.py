@@ -12,8 +12,8 @@ Objects are scaled to size 1, and contacts have a noise of .0005. The Markdown t
 
 The peers take the same contacts with the same exact normals: screened Poisson reconstruction, and a Gaussian
 process implicit surface with a Matern covariance of order 3/2. Each is at the setting with the best IoU,
-which its user would not know. The process takes MOST_CONTACTS of them, and makes no mesh: its distance is
-that from the object alone.
+which its user would not know. The process takes a thousand of them, and makes no mesh: its distance is that
+from the object alone.
 """
 
 import sys

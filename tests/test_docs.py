@@ -83,6 +83,8 @@ def test_every_picture_is_drawn_by_a_command_or_taken_of_a_window_and_stands_on_
 def test_every_command_of_a_figure_is_there():
     for run in figures.RUNS.values():
         assert (ROOT / f"{run.words.split()[0].replace('.', '/')}.py").is_file(), run.words
+        if run.title:  # The appendix says what is measured, in the words of the docstring.
+            assert len(figures.description(run.described_in or run.words.split()[0])) > 200, run.words
 
 
 @pytest.mark.long

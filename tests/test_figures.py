@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a small run of benchmarks.accuracy finds is what the README and the first table of the pages have."""
+"""What small runs of benchmarks find is what the README and the first tables of the pages have."""
 
 import csv
 import shutil
@@ -13,12 +13,12 @@ import benchmarks
 from benchmarks import accuracy
 from tools import figures
 
-SHAPES = 16
+SHAPES, POINTS = 16, 4
 ALIKE = {accuracy.CUBIC: "mean / cubic's", accuracy.PROCESS: "mean / process's"}
 
 
 def cell(head, row, column):
-    """A cell of a table that the benchmark has printed."""
+    """A cell of a table that benchmarks.accuracy has printed."""
     rows = figures.printed("accuracy", head)
     (found,) = (each for each in rows[2:] if each[0] == row)
     return found[rows[0].index(column)]
@@ -49,6 +49,27 @@ def test_the_errors_on_random_shapes_are_those_of_the_readme_within_their_noise(
     covered = 100.0 * means(accuracy.BAYES, "covered")
     told = float(cell("planes | median", "all", "covered").split()[0])
     assert told == pytest.approx(covered.mean(), abs=3.0 * covered.std() / np.sqrt(SHAPES))
+
+
+@pytest.mark.long
+def test_the_figures_of_scans_are_those_of_the_readme_within_their_noise(scans):
+    pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+    from benchmarks import real
+
+    objects = [real.Scan(path) for path in benchmarks.scan_files()]
+    cells = [real.fixed_scores(scan, POINTS, {real.OURS: real.ours})[0] for scan in objects]
+    covered = np.array([np.mean([of[real.OURS].covered for of in found.values()]) for found in cells])
+    rows = figures.printed("real", "planes | extent")
+    told = np.mean([float(row[rows[0].index("within, bayes")]) for row in rows[2:]])
+    assert told == pytest.approx(covered.mean(), abs=3.0 * covered.std() / np.sqrt(len(covered)))
+    found = np.sum([real.automatic_row(scan, POINTS)[:7] for scan in objects], axis=0)
+    head, *_, total = figures.printed("real", "scan | sure")
+    numbers = np.array(total[1:8], dtype=float)
+    touches, shares = found[:3].sum(), numbers / numbers[:3].sum()
+    for name in ("sure", "sure, off > 2 %", "turned"):
+        i = head.index(name) - 1
+        noise = np.sqrt(shares[i] * (1.0 - shares[i]) * touches)
+        assert found[i] == pytest.approx(shares[i] * touches, abs=3.0 * noise + 1e-9), name
 
 
 def test_a_benchmark_without_scans_says_where_they_are_from(tmp_path, monkeypatch):

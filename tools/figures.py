@@ -5,7 +5,8 @@
 `make figures` takes hours; `make figures ONLY=NAME` runs only the commands with NAME in their names, and
 `python -m tools.figures --fill` only fills the pages again. What a command prints is kept in
 docs/figures/NAME.txt, whose last line has the machine and the commit; docs/figures.md, the appendix, has all
-of it. No figure is typed in another page. Those have marks, where HEAD is how the head of a table begins:
+of it, each below the docstring of its command. No figure is typed in another page. Those have marks, where
+HEAD is how the head of a table begins:
 
 - <!-- table NAME "HEAD" COLUMNS --> ... <!-- end --> shows these columns of the table, from 1 on, or all if
   none is named; 2=error gives column 2 another head.
@@ -14,6 +15,7 @@ of it. No figure is typed in another page. Those have marks, where HEAD is how t
 """
 
 import argparse
+import ast
 import os
 import re
 import shlex
@@ -38,6 +40,7 @@ class Run(NamedTuple):
     pictures: Mapping[str, str | None] = MappingProxyType(
         {}
     )  # {in docs: in build, or None if it writes there}
+    described_in: str = ""  # The module whose docstring says what is measured, if another than the command.
 
 
 def _chart(name: str) -> dict[str, str | None]:
@@ -58,7 +61,11 @@ RUNS = {
     "curvatures": Run("benchmarks.curvatures", "How often deviations hold"),
     "facets": Run(f"benchmarks.facets {ZIP}", "Facets"),
     "stability": Run("benchmarks.stability", "Limits of the methods", _chart("stability")),
-    "shapes": Run("benchmarks.atlas --shapes --coarsest 0.002", "Made objects, touched all over"),
+    "shapes": Run(
+        "benchmarks.atlas --shapes --coarsest 0.002",
+        "Made objects, touched all over",
+        described_in="benchmarks.atlas_shapes",
+    ),
     "atlas": Run("benchmarks.atlas --coarsest 0.002", "Scans, touched all over"),
     "field": Run("benchmarks.field $YCB", "Objects of a public set, touched all over"),
     "add_menu": Run(
@@ -160,12 +167,21 @@ def kept(name: str) -> str:
     return (KEPT / f"{name}.txt").read_text(encoding="utf-8").strip()
 
 
+def description(module: str) -> str:
+    """The docstring of a command's module: what it measures, and what its columns are."""
+    path = ROOT / f"{module.replace('.', '/')}.py"
+    return ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+
+
 def appendix() -> str:
     """The page of all figures, and of the commands behind the pictures."""
-    parts = [HEAD]
+    parts, described = [HEAD], set[str]()
     for name, run in RUNS.items():
         if run.title:
-            parts.append(f"## {run.title}\n\n`python -m {run.words}` prints:\n\n{kept(name)}\n")
+            module = run.described_in or run.words.split()[0]
+            text = "" if module in described else f"{description(module)}\n\n"
+            described.add(module)
+            parts.append(f"## {run.title}\n\n{text}`python -m {run.words}` prints:\n\n{kept(name)}\n")
             parts += [f"![{run.title}]({p})\n" for p in run.pictures if not p.endswith(".csv")]
     rows = [
         f"| {', '.join(f'`{p}`' for p in run.pictures if not p.endswith('.csv'))} | `python -m {run.words}` |"

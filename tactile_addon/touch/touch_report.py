@@ -3,44 +3,52 @@
 """The report of a touch: a dict of plain values, including its message.
 
 The values are such as JSON can hold, or ID properties of a patch object. Lengths are in units of the world,
-curvatures in their inverse, angles in degrees; a `_std` is a standard deviation. Keys are there once they
-are known:
+curvatures in their inverse, angles in degrees; a `_std` is a standard deviation. A report has each key once
+it is known. After every fit:
 
-after every fit
-  status, message, doubts : see core.Reconstruction and core.Doubt.to_dict, the gravest first; the status is
-      "outdated" if the patch is from an earlier touch
-  ended : a sentence on what has ended the curves, which is part of the message
-  is_verified : whether the keys are there that take long
-  frame : the Darboux frame in the world: origin, d1, d2 and normal, three numbers each
-  k1, k2, gaussian_curvature, mean_curvature, each with its `_std`; shape_index, curvedness
-  residual : the amplitude of the process that is added to the polynomial
-  coefficients, radius : those of equation (1)
-  contacts, fit_error : their number, and equation (6)
-  height_std : the mean over the domain
-  blind : the number of ways to bend that the planes cannot show
-  source : the name of the object that was touched, or of the file of the contacts
-  method, degree, seconds (by step)
-  axes : (3, 3), see core.SamplingPlane.axes
-after a touch
-  object_size : the longest edge of the bounding box
-  extent, step, noise, seed
-  planes : the azimuth and the tilt of each
-  added_planes : azimuth, height_std_before and height_std of each plane that the touch has added
-  stops : why each curve ended, at its start and at its end
-  height_error : the mean distance in height from the mesh, over the domain
-after a fit to measured contacts
-  unit, curves, strokes, given_contacts
-  misses : how far the curves miss their common point
-once a gesture has ended
-  height_std_rim : the largest one on the boundary of the domain
-  area, total_absolute_curvature, condition_number
-  vertices, vertex_distance_mean, vertex_distance_max : of the mesh, over the patch
-  suggested_plane : azimuth, tangent in the world, and expected_height_std with it
-  patch : the name of the patch object
-  color_limit : where the colors end
-after registration and verification
-  registration : target, pose from 1 on, residuals and nearest vertices of all poses, is_ambiguous
-  verification : the name of the mesh as `target`, and what core.verify has found
+status, message, doubts : see core.Reconstruction and core.Doubt.to_dict, the gravest first; the status is
+    "outdated" if the patch is from an earlier touch
+ended : a sentence on what has ended the curves, which is part of the message
+is_verified : whether the report has the keys that take long
+frame : the Darboux frame in the world: origin, d1, d2 and normal, three numbers each
+k1, k2, gaussian_curvature, mean_curvature : at the point, each with its `_std`
+shape_index, curvedness : at the point
+residual : the amplitude of the process that is added to the polynomial
+coefficients, radius : those of equation (1)
+contacts, fit_error : their number, and equation (6)
+height_std : the mean over the domain
+blind : the number of ways to bend that the planes cannot show
+source : the name of the object that was touched, or of the file of the contacts
+method, degree, seconds : of the fit; the seconds of each step
+axes : (3, 3), see core.SamplingPlane.axes
+
+After a touch:
+
+object_size : the longest edge of the bounding box
+extent, step, noise, seed : those in use
+planes : the azimuth and the tilt of each
+added_planes : azimuth, height_std_before and height_std of each plane that the touch has added
+stops : why each curve ended, at its start and at its end
+height_error : the mean distance in height from the mesh, over the domain
+
+After a fit to measured contacts:
+
+unit, curves, strokes, given_contacts : the unit's name, and the numbers of what the files have
+misses : how far the curves miss their common point
+
+Once a gesture has ended:
+
+height_std_rim : the largest one on the boundary of the domain
+area, total_absolute_curvature, condition_number : of the domain, (7), and of plain least squares
+vertices, vertex_distance_mean, vertex_distance_max : of the mesh, over the patch
+suggested_plane : azimuth, tangent in the world, and expected_height_std with it
+patch : the name of the patch object
+color_limit : where the colors end
+
+After registration and verification:
+
+registration : target, pose from 1 on, residuals and nearest vertices of all poses, is_ambiguous
+verification : the name of the mesh as `target`, and what core.verify has found
 """
 
 import math

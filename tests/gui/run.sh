@@ -7,7 +7,14 @@
 # maps by mouse and keyboard in a window, what hundreds of touches leave behind, and installing from a
 # repository. The pictures in build/gui are to be looked at. CHECK runs only the steps with this in their
 # name, such as "random steps". TACTILE_OUT names another folder than build/gui, so that two runs can go on
-# at once.
+# at once. TACTILE_GUI names the script that starts Blender, which is not part of the source:
+#
+#   run ARGS...                    blender ARGS without a window
+#   shot SCRIPT.py OUT.png [W H]   Blender in a window, running SCRIPT.py until this calls gui.ready(); then
+#                                  OUT.png is the picture of the screen
+#   sh COMMAND...                  any command on the same display
+#
+# SCRIPT.py imports gui, which this script provides: ready(), shot(PICTURE) and the mouse and keys.
 set -euo pipefail
 [ $# = 1 ] || [ $# = 2 ] || { echo "usage: run.sh ZIP [CHECK]" >&2; exit 2; }
 only=${2:-}
@@ -15,7 +22,8 @@ zip=$(readlink -f "$1")
 [ -f "$zip" ] || { echo "run.sh: there is no file $1" >&2; exit 2; }
 cd "$(dirname "$0")/../.."
 
-gui=../shared/blender/gui.sh
+gui=${TACTILE_GUI:-../shared/blender/gui.sh}
+[ -e "$gui" ] || { echo "run.sh: TACTILE_GUI has to name a script that starts Blender in a window" >&2; exit 2; }
 out=${TACTILE_OUT:-build/gui}
 log=$out/log.txt
 export BLENDER_USER_RESOURCES=$out-user

@@ -10,6 +10,7 @@ import surfaces
 
 import core
 from core import Contour, DegenerateCurvesError
+from core.reconstruction.ball import center_at
 
 BALL, RING, TUBE = 3.0, 60.0, 20.0
 PLANES = surfaces.planes((10, 70, 130))
@@ -65,6 +66,14 @@ def test_the_reference_point_may_be_a_contact(side, noise):
     assert by_contact.frame.origin == pytest.approx(truth.point, abs=max(1e-12, noise))
     assert by_contact.patch.k1 == pytest.approx(by_center.patch.k1, rel=0.05)
     assert by_contact.patch.k2 == pytest.approx(by_center.patch.k2, rel=0.05, abs=1e-3)
+
+
+@pytest.mark.parametrize(("share", "is_center"), [(0.45, True), (0.55, False)])
+def test_a_point_within_half_the_ball_s_radius_of_a_center_is_one(share, is_center):
+    centers, contours = felt(1, 1)
+    point = centers.point - share * BALL * centers.normal
+    center = point if is_center else centers.point
+    assert center_at(point, contours, BALL) == pytest.approx(center, abs=1e-4)
 
 
 @pytest.mark.parametrize("side", [1, -1])
