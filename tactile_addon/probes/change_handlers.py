@@ -198,6 +198,7 @@ HANDLERS = {
     "frame_change_post": on_frame_change,
     "blend_import_post": on_blend_import,
     "load_post": on_other_data,
+    "save_pre": deleted.remove,
     "undo_pre": undo.take_out,
     "redo_pre": undo.take_out,
     "undo_post": after_undo,

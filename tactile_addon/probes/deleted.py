@@ -5,6 +5,7 @@
 from typing import Any
 
 import bpy
+from bpy.app.handlers import persistent
 
 from ..scene import patch_object
 from ..touch.settings import silent
@@ -75,10 +76,12 @@ def relink(probe: Object) -> None:
             anchor.attach(probe, target)
 
 
-def remove() -> None:
+@persistent
+def remove(*_: Any) -> None:
     """Removes deleted targets and empty collections if nobody uses them.
 
-    A timer calls it, because a handler may not delete what is being evaluated.
+    A timer calls it, because a handler may not delete what is being evaluated, and so does a file that is
+    saved, as there are no timers without a window.
     """
     gone: list[Any] = [o for o in bpy.data.objects if o.session_uid in targets and not o.users]
     gone += patch_object.empty_collections()

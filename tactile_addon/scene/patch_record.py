@@ -89,8 +89,7 @@ def reading(obj: Object) -> Iterator[None]:
 
 def is_colored(obj: Object) -> bool:
     """Whether an object is a patch or a whole object that nobody has edited, so that it can show colors."""
-    is_one = ATLAS_RECORD in obj or report_of(obj) is not None
-    return is_one and obj.type == "MESH" and _is_whole(obj)
+    return (ATLAS_RECORD in obj or report_of(obj) is not None) and obj.type == "MESH" and _is_whole(obj)
 
 
 def require_colored(obj: Object) -> None:

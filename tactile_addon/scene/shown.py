@@ -20,6 +20,7 @@ from ... import core
 from ..touch import units
 from ..touch.evaluated_mesh import read_array
 from ..touch.types import Array, Object
+from ..touch.wording import is_flat
 from . import colors
 from .mesh_data import COLOR, CURVATURE_STD, CURVATURES, POSITION, own_mesh, values
 from .patch_record import ATLAS_RECORD, COMMON_RANGE, POWERS, RANGE, RECORD, is_colored, report_of
@@ -34,13 +35,17 @@ TICKS = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # Ranges are t
 def recolor(obj: Object) -> None:
     """Colors a patch or whole object by the quantity it is set to show, and keeps the range in its record.
 
-    What is unknown of a whole object is as on the same wall, or gray if the wall is narrow.
+    What is unknown of a whole object is as on the same wall, or gray if the wall is narrow. A patch that is
+    flat has no shape index.
     """
     own_mesh(obj)
     shown, mesh, record = obj.tactile_colors, obj.data, _record(obj)
     limit = obj.get(RANGE) or _automatic_range(obj, record, shown)
     rgba = np.vstack([colors.shades(values(mesh, shown), limit), colors.UNKNOWN])
-    at = np.arange(len(mesh.vertices)) if RECORD in obj else _corners_shown(mesh, shown, record["edge"])
+    if RECORD in obj:
+        at = np.where(shown == "shape_index" and is_flat(record), -1, np.arange(len(mesh.vertices)))
+    else:
+        at = _corners_shown(mesh, shown, record["edge"])
     mesh.attributes[COLOR].data.foreach_set("color_srgb", rgba[at].ravel())
     record["is_gray"] = bool((at < 0).any())
     if mesh.color_attributes.active_color_name != COLOR or mesh.color_attributes.default_color_name != COLOR:

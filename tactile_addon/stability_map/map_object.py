@@ -182,8 +182,7 @@ def touched_near(painted: Object, location: list[float]) -> list[float]:
     if len(found) < 3:  # It was joined with another object.
         return location
     place = painted.matrix_world @ Vector(found)
-    is_near = (place - Vector(location)).length <= max(painted.dimensions)
-    return list(place) if is_near else location
+    return list(place) if (place - Vector(location)).length <= max(painted.dimensions) else location
 
 
 def inputs_of(painted: Object) -> dict[str, Any]:

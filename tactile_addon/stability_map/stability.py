@@ -139,8 +139,7 @@ class StabilityMap:
         count = len(self.places)
         self.measures = np.full(count, NOTHING, dtype=[(name, float) for name in MEASURES])
         self.reason = np.full(count, REASON_KEYS.index("nothing"), dtype=np.int32)
-        batch = BATCH if self.extent else GROWING_BATCH
-        size = batch if self.fit["method"] == "bayes" else 1
+        size = 1 if self.fit["method"] != "bayes" else BATCH if self.extent else GROWING_BATCH
         self.began = perf_counter()
         for start in range(0, count, size):
             end = min(start + size, count)

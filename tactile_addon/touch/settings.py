@@ -182,12 +182,16 @@ def touch_arguments(settings: Any) -> dict[str, Any]:
 
 
 def draw_chosen(layout: bpy.types.UILayout, settings: Any, name: str) -> None:
-    """Draws a setting; of a number that is left to the surface, the one in use, if that can be changed."""
-    if getattr(settings, name) or name not in AUTO:
-        layout.prop(settings, name)
-    else:
-        is_used = hasattr(settings, f"used_{name}") and settings.id_data.override_library is None
+    """Draws a setting; of a number that is left to the surface, the one in use.
+
+    In the override of a library's probe that is gray, so the setting has a row of its own, too.
+    """
+    is_auto = name in AUTO and not getattr(settings, name)
+    is_used = is_auto and hasattr(settings, f"used_{name}")
+    if is_auto:
         layout.prop(settings, f"used_{name}" if is_used else name, text=AUTO[name])
+    if not is_auto or (is_used and settings.id_data.override_library is not None):
+        layout.prop(settings, name)
 
 
 def draw_noise(layout: bpy.types.UILayout, settings: Any) -> None:

@@ -261,8 +261,7 @@ def plane_axes(matrix: Any, settings: Any, number: int) -> Array:
     See core.SamplingPlane.axes. A tilt that is too steep to touch with is drawn as the steepest.
     """
     tilt = min(max(settings.tilts[number], -STEEPEST), STEEPEST)
-    plane = core.SamplingPlane(settings.azimuths[number], tilt)
-    return plane.axes(matrix.col[2].xyz, matrix.col[0].xyz)
+    return core.SamplingPlane(settings.azimuths[number], tilt).axes(matrix.col[2].xyz, matrix.col[0].xyz)
 
 
 def _verification_report(

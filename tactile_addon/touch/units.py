@@ -89,8 +89,7 @@ def _decimals(std: float) -> int:
 
 def length(value: float) -> str:
     """A length in words for a message, in the unit of the open scene."""
-    size = abs(value) if 0.0 < abs(value) < math.inf else 1.0
-    return say(value, 1, unit_of(bpy.context.scene, size))
+    return say(value, 1, unit_of(bpy.context.scene, abs(value) if 0.0 < abs(value) < math.inf else 1.0))
 
 
 def duration(seconds: float) -> str:

@@ -227,8 +227,7 @@ def said(report: Mapping[str, Any], key: str, power: int) -> str:
 
 def _shared(report: Mapping[str, Any], key: str) -> str:
     """A length of the report in words, with its share of the radius."""
-    share = 100.0 * report[key] / report["radius"]
-    return f"{said(report, key, 1)}, {share:.2f} % of the radius"
+    return f"{said(report, key, 1)}, {100.0 * report[key] / report['radius']:.2f} % of the radius"
 
 
 def _length(value: float, report: Mapping[str, Any]) -> str:

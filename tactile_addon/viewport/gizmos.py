@@ -138,8 +138,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         here, there = _seen(context, center), _seen(context, center + reach * _right(context))
         if here is None or there is None:
             return
-        ui_scale = context.preferences.system.ui_scale
-        gizmo = context.preferences.view.gizmo_size * ui_scale
+        gizmo = context.preferences.view.gizmo_size * context.preferences.system.ui_scale
         scale = min(max(SHARE * (there - here).length / gizmo, LEAST_BALL), BALL)
         for ball in (self.point, *self.turns, *self.tilts):
             ball.scale_basis = scale

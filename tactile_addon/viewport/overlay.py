@@ -113,8 +113,7 @@ def draw_legend() -> None:
         shown = patch.tactile_colors
         low = 0.0 if shown in patch_record.POSITIVE else -1.0
         title = patch.bl_rna.properties["tactile_colors"].enum_items[shown].name
-        power = patch_record.POWERS[shown]
-        bar = _scale(title, record, power, low)
+        bar = _scale(title, record, patch_record.POWERS[shown], low)
         _draw_box(context, *bar, [("Unknown", colors.UNKNOWN)] if record.get("is_gray") else ())
     elif obj is not None and patch_record.MAP_RECORD in obj and obj.visible_get():
         record, shown = obj[patch_record.MAP_RECORD], obj.tactile_map_colors

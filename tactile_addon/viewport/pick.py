@@ -68,7 +68,7 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
     )
 
     # Where the mouse came last, if nothing can have moved it since: a busy Blender hears of a click late, and
-    # takes it to be where the mouse is by then.
+    # takes it to be where the mouse is by then. The tool has each move of the mouse noted for its click.
     _mouse: tuple[int, int] | None = None
 
     @classmethod
@@ -76,6 +76,9 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         return is_in_object_mode(cls, context, "Points are picked") and has_mesh(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
+        if event.type == "MOUSEMOVE":
+            TACTILE_OT_pick._mouse = place_of(event)
+            return {"PASS_THROUGH"}
         if context.area is None or context.area.type != "VIEW_3D":
             return report_error(self, ValueError("Points are picked in a 3D viewport: start the pick there"))
         active = context.view_layer.objects.active
@@ -94,9 +97,10 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         context.window.cursor_modal_set("EYEDROPPER")
         context.workspace.status_text_set(lambda header, _: draw_hints(header.layout, HINTS))
         if self.at_once:
-            return self._press(context, place_of(event))
+            return self._press(context, self._mouse or place_of(event))
         context.window_manager.modal_handler_add(self)
-        self._hover(context, place_of(event))
+        self._mouse = place_of(event)
+        self._hover(context, self._mouse)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
@@ -233,12 +237,9 @@ class TactileTool(bpy.types.WorkSpaceTool):
     bl_label = "Tactile Probe"
     bl_description = "Click on a mesh to place a probe there or to move the active probe there"
     bl_icon = "ops.paint.eyedropper_add"
-    bl_keymap = (
-        (
-            TACTILE_OT_pick.bl_idname,
-            {"type": "LEFTMOUSE", "value": "PRESS"},
-            {"properties": [("at_once", True)]},
-        ),
+    bl_keymap = tuple(
+        (TACTILE_OT_pick.bl_idname, {"type": kind, "value": value}, {"properties": [("at_once", True)]})
+        for kind, value in (("LEFTMOUSE", "PRESS"), ("MOUSEMOVE", "ANY"))
     )
 
 

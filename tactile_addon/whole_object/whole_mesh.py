@@ -86,9 +86,7 @@ class GrowingPatches:
 
     def remove(self) -> None:
         """Deletes the object, if it is still there."""
-        obj = self._object()
-        if obj is not None:
-            patch_object.remove_objects([obj])
+        patch_object.remove_objects([*filter(None, [self._object()])])
 
     def _object(self) -> Object | None:
         return next((obj for obj in bpy.data.objects if obj.session_uid == self._uid), None)

@@ -49,11 +49,11 @@ def reports():
     return record["extent"], record["status"], bool(record["is_verified"])
 
 
-def busy_click(place):
+def busy_click(place, how, start, *given, **options):
     """A click while Blender is busy makes a probe where the mouse was then, not where it is later."""
     window, area, region = gui.find()
     with bpy.context.temp_override(window=window, area=area, region=region):
-        bpy.ops.tactile.pick("INVOKE_DEFAULT", new=True)
+        start(*given, **options)
     yield 1
     at = [round(v) for v in gui.view_point(place)]
     moves = (*("mousemove", at[0] - 40, at[1], "sleep", 0.2, "mousemove", *at, "sleep", 0.2), *("click", 1))
@@ -62,7 +62,7 @@ def busy_click(place):
     yield 1
     yield from until(is_complete)
     off = math.dist(gui.view_point(probe().matrix_world.translation), at)
-    check("a click in a busy second is where the mouse was", off < 5, off)
+    check(f"a click with the {how} in a busy second is where the mouse was", off < 5, off)
     bpy.data.objects.remove(patch())
     bpy.data.objects.remove(probe())
     yield 1
@@ -75,9 +75,11 @@ def steps():
     center, place = below(obj, SIDE)
     look(center, SIDE, 1.6 * max(obj.dimensions))
     yield 1
-    yield from busy_click(place)
+    yield from busy_click(place, "panel's button", bpy.ops.tactile.pick, "INVOKE_DEFAULT", new=True)
+    yield from busy_click(place, "tool", bpy.ops.wm.tool_set_by_id, name="tactile.tool")
     window, area, region = gui.find()
     with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
         bpy.ops.tactile.pick(target=name, location=place, new=True)
     yield 1
     yield from until(is_complete)

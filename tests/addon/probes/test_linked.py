@@ -106,6 +106,38 @@ def test_the_override_of_a_probe_is_touched_with_its_own_numbers_and_keeps_them(
         assert len(patch["tactile"]["planes"]) == 5
 
 
+class Layout:
+    """What is drawn into it: the names of properties, and their texts."""
+
+    def __init__(self):
+        self.rows = []
+
+    def prop(self, _, name, text=None):
+        self.rows.append((name, text))
+
+
+def test_an_automatic_number_of_an_override_is_the_one_in_use_and_another_may_be_given(
+    empty, extension, library
+):
+    settings = extension.tactile_addon.touch.settings
+
+    def rows(name):
+        layout = Layout()
+        settings.draw_chosen(layout, probe.tactile_probe, name)
+        return layout.rows
+
+    linked = empty.data.collections["Tactile Patches"]
+    linked.override_hierarchy_create(empty.context.scene, empty.context.view_layer, do_fully_editable=True)
+    probe = next(o for o in empty.data.objects if o.type == "EMPTY" and o.library is None)
+    assert rows("extent") == [("extent", None)]  # It was given.
+    assert rows("step") == [("used_step", "Step (Auto)"), ("step", None)]
+    assert probe.tactile_probe.used_step > 0.0
+    assert not probe.tactile_probe.is_property_overridable_library("used_step")
+    assert probe.tactile_probe.is_property_overridable_library("step")
+    probe.tactile_probe.step = 0.1
+    assert rows("step") == [("step", None)]
+
+
 def test_the_colors_of_a_linked_patch_stay(empty, library):
     patch = empty.data.objects["Sphere Patch"]
     limit = patch["tactile"]["color_limit"]

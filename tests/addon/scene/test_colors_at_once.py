@@ -75,6 +75,9 @@ def test_a_flat_patch_is_pale_and_a_bent_one_beside_it_is_not(empty):
     side.tactile_colors = "gaussian_curvature"
     found = np.abs(values(side.data, "gaussian_curvature"))
     assert np.median(found) < 0.1 * side["tactile"]["color_limit"]
+    for patch in (lid, side):
+        patch.tactile_colors = "shape_index"
+    assert (lid["tactile"]["is_gray"], side["tactile"]["is_gray"]) == (True, False)  # A plane has none.
 
 
 def test_a_touch_that_knows_nothing_does_not_set_the_range(empty, ball):

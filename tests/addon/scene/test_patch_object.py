@@ -111,3 +111,10 @@ def test_an_empty_collection_of_patches_is_removed_if_undo_can_bring_its_links_b
         empty.data.objects.remove(there(what))
     deleted.remove()
     assert ("Tactile Patches" in empty.data.collections) is (use != "none")
+
+
+def test_a_file_saved_without_a_window_has_no_empty_collection(empty, there, tmp_path):
+    for what in ("Probe", "Patch"):
+        empty.data.objects.remove(there(what))
+    empty.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    assert "Tactile Patches" not in empty.data.collections

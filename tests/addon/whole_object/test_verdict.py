@@ -72,17 +72,22 @@ def test_a_cube_is_a_cube_with_sharp_edges(empty, extension):
 
 @pytest.mark.long
 @pytest.mark.parametrize(("turns", "most"), [((0.0, 0.0, 0.0), 6), ((0.3, 0.5, 0.7), 30)])
-def test_limited_dissolve_leaves_few_faces_of_a_cube(empty, turns, most):
-    import bmesh
+def test_a_planar_decimate_modifier_leaves_few_faces_of_a_cube_and_its_colors(empty, turns, most):
+    def faces():
+        return len(surface.evaluated_get(empty.context.evaluated_depsgraph_get()).data.polygons)
 
     empty.ops.mesh.primitive_cube_add(size=2.0, rotation=turns)
     surface, _ = touched(empty)
-    mesh = bmesh.new()
-    mesh.from_mesh(surface.data)
-    everything = {"verts": mesh.verts[:], "edges": mesh.edges[:]}
-    bmesh.ops.dissolve_limit(mesh, angle_limit=np.radians(1.0), use_dissolve_boundaries=False, **everything)
-    assert 6 <= len(mesh.faces) <= most
-    mesh.free()
+    decimate = surface.modifiers.new("Decimate", "DECIMATE")
+    decimate.decimate_type, decimate.angle_limit = "DISSOLVE", np.radians(0.5)
+    assert 6 <= faces() <= most
+    for shown in ("deviation", "gaussian_curvature"):
+        surface.tactile_colors = shown
+        assert not surface["tactile_object"]["is_gray"]
+    assert empty.ops.tactile.look_farthest() == {"FINISHED"}
+    assert empty.ops.tactile.mesh_again(edge=0.25) == {"FINISHED"}
+    assert 6 <= faces() <= most
+    assert len(surface.data.vertices) > 100
 
 
 def test_growing_patches_are_above_the_mesh_and_each_other(empty, extension, touches_of):
