@@ -5,7 +5,7 @@
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -26,7 +26,7 @@ TURNS = np.radians([0.0, 20.0, 40.0])  # The curves, turned by these around the 
 DISTINCT, SMOOTH = math.radians(1.0), math.radians(40.0)
 # if both facets have this share of the wider one's width across it; else one is a fillet. Facets are fine if
 # the one at the point is narrower than this share of the radius.
-MIN_WIDTH_RATIO = 0.25
+MIN_WIDTH_RATIO = 0.15
 NEIGHBOR_STEP = 0.05  # The neighbor across an edge is the facet at this share of the width beyond the edge.
 
 
@@ -68,9 +68,11 @@ def _shape_curvatures(r: Reconstruction, mesh: FacetedSurface) -> list[Array]:
     width = _smooth_width(r.frame.origin, mesh)
     if width < max(MIN_WIDTH_RATIO * r.radius, SMALLEST):
         return []
-    facet, points = cache(lambda face: _facet(mesh, face)), _around(r, TURNING * width)
+    facet = cache(lambda face: _facet(mesh, face))
+    around = partial(_around, r, facet(mesh.face_near(r.frame.origin)).corners, width)
+    points = around(TURNING)
     by_turning = _turning(r, points, [facet(mesh.face_near(point)) for point in points])
-    faces_within = [set(map(mesh.face_near, _around(r, share * width))) for share in CORNERS]
+    faces_within = [set(map(mesh.face_near, around(share))) for share in CORNERS]
     by_corners = [_of_corners(r, map(facet, faces)) for faces in faces_within]
     return [by_turning, *(estimate for estimate in by_corners if estimate is not None)]
 
@@ -80,16 +82,20 @@ def is_beside_bend(point: Array, mesh: FacetedSurface) -> bool:
     return _smooth_width(point, mesh) > 0.0
 
 
-def _around(r: Reconstruction, reach: float) -> Array:
-    """Points (n, 3) of the world along the curves, out to a length, and these turned around the normal.
+def _around(r: Reconstruction, corners: Array, width: float, share: float) -> Array:
+    """Points (n, 3) of the world along the curves and these turned around the normal, to a share of widths.
 
-    Where facets narrow, as near the tip of a cone, the points end where the patch has turned by SMOOTH.
+    Widths are those in each direction of the facet that has these corners, and at most the given one. Where
+    facets narrow, as near the tip of a cone, the points end where the patch has turned by SMOOTH.
     """
-    reach = 1.0 / max(abs(r.k1) / SMOOTH, abs(r.k2) / SMOOTH, 1.0 / reach)
-    points = np.vstack([contour.points for contour in r.contours])
-    x, y, z = reach / r.radius * r.frame.to_local(points).T
+    x, y, z = r.frame.to_local(np.vstack([contour.points for contour in r.contours])).T / r.radius
     turned = [(x * c - y * s, x * s + y * c, z) for c, s in zip(np.cos(TURNS), np.sin(TURNS), strict=True)]
-    return r.frame.to_world(np.concatenate(turned, axis=1).T)
+    points = np.concatenate(turned, axis=1).T
+    toward = points[:, :2] / np.maximum(np.hypot(points[:, :1], points[:, 1:2]), SMALLEST)
+    widths = np.ptp(toward @ r.frame.to_local(corners)[:, :2].T, axis=1)
+    bent = max(abs(r.k1), abs(r.k2)) / SMOOTH
+    reach = 1.0 / np.maximum(bent, 1.0 / np.maximum(share * np.minimum(widths, width), SMALLEST))
+    return r.frame.to_world(reach[:, None] * points)
 
 
 def _turning(r: Reconstruction, points: Array, facets: list[Facet]) -> Array:
