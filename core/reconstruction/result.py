@@ -374,7 +374,7 @@ class Reconstruction(Judged):
     def _doubting(self) -> Iterator[Doubt]:
         """Reasons to doubt it, the gravest first."""
         useless, radius = status.useless(self.method, self.contours, self.shape_curvatures), self.radius
-        yield from status.about_facets(self._off_shape, self.shape_curvatures)
+        yield from status.about_facets(self._off_shape, self.shape_curvatures, radius)
         stops = stops_at(self.contours, self.frame.origin, AT_POINT * radius)
         yield from status.about_taps(self.taps, any(stop in SURFACE_ENDS for stop in stops), useless)
         if not self.converged:
