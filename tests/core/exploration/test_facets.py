@@ -334,6 +334,17 @@ def test_curvatures_of_flattened_balls_are_seldom_wrongly_said_to_be_those_of_fa
     assert wrong <= 12  # Patches reach over the rim, where their deviation is as large.
 
 
+@pytest.mark.parametrize("latitude", [3.4, 5.0, 5.6, 6.8])
+def test_narrow_facets_of_the_rim_of_a_flat_ball_are_not_its_curvature(latitude):
+    """They are a fifth as wide as long, and turn by 66 degrees at the rim."""
+    ball, v = Mesh(uv_ball(32, 16).corners * (1.0, 1.0, 0.15)), math.radians(latitude)
+    toward = np.array([math.cos(v), 0.05 * math.cos(v), 0.15 * math.sin(v)])
+    point, normal = ball.ray_cast(tuple(2.0 * toward), tuple(-toward / np.linalg.norm(toward)), 3.0)
+    r, _ = judged(core.explore(ball, point, normal).result, ball)
+    k1 = ellipsoid(1.0, 1.0, 0.15, v=math.atan2(point[2] / 0.15, math.hypot(*point[:2]))).k1
+    assert r.status != "ok" or not is_beyond(abs(min(r.k1, r.k2) - k1), r)
+
+
 def cone(segments):
     """Blender's cone, of radius 1 and height 2, around the origin."""
     angles = 2.0 * math.pi / segments * np.arange(segments + 1)
