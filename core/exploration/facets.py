@@ -68,12 +68,9 @@ def _shape_curvatures(r: Reconstruction, mesh: FacetedSurface) -> list[Array]:
     width = _smooth_width(r.frame.origin, mesh)
     if width < max(MIN_WIDTH_RATIO * r.radius, SMALLEST):
         return []
-    facet = cache(lambda face: _facet(mesh, face))
-    around = partial(_around, r, facet(mesh.face_near(r.frame.origin)).corners, width)
-    points = around(TURNING)
-    by_turning = _turning(r, points, [facet(mesh.face_near(point)) for point in points])
-    faces_within = [set(map(mesh.face_near, around(share))) for share in CORNERS]
-    by_corners = [_of_corners(r, map(facet, faces)) for faces in faces_within]
+    facet, around = cache(lambda face: _facet(mesh, face)), partial(_around, r, mesh, width)
+    by_turning = _turning(r, points := around(TURNING), [facet(mesh.face_near(point)) for point in points])
+    by_corners = [_of_corners(r, map(facet, set(map(mesh.face_near, around(share))))) for share in CORNERS]
     return [by_turning, *(estimate for estimate in by_corners if estimate is not None)]
 
 
@@ -82,20 +79,21 @@ def is_beside_bend(point: Array, mesh: FacetedSurface) -> bool:
     return _smooth_width(point, mesh) > 0.0
 
 
-def _around(r: Reconstruction, corners: Array, width: float, share: float) -> Array:
+def _around(r: Reconstruction, mesh: FacetedSurface, width: float, share: float) -> Array:
     """Points (n, 3) of the world along the curves and these turned around the normal, to a share of widths.
 
-    Widths are those in each direction of the facet that has these corners, and at most the given one. Where
-    facets narrow, as near the tip of a cone, the points end where the patch has turned by SMOOTH.
+    Widths are those of the facet at the point in each direction, and at most the given one. Where facets
+    narrow, as near the tip of a cone, the points end where the patch has turned by SMOOTH.
     """
     x, y, z = r.frame.to_local(np.vstack([contour.points for contour in r.contours])).T / r.radius
     turned = [(x * c - y * s, x * s + y * c, z) for c, s in zip(np.cos(TURNS), np.sin(TURNS), strict=True)]
-    points = np.concatenate(turned, axis=1).T
-    toward = points[:, :2] / np.maximum(np.hypot(points[:, :1], points[:, 1:2]), SMALLEST)
-    widths = np.ptp(toward @ r.frame.to_local(corners)[:, :2].T, axis=1)
-    bent = max(abs(r.k1), abs(r.k2)) / SMOOTH
-    reach = 1.0 / np.maximum(bent, 1.0 / np.maximum(share * np.minimum(widths, width), SMALLEST))
-    return r.frame.to_world(reach[:, None] * points)
+    points, corners = np.concatenate(turned, axis=1).T, mesh.corners_of(mesh.face_near(r.frame.origin))
+    spans = np.ptp(points[:, :2] @ r.frame.to_local(corners)[:, :2].T, axis=1)
+    widths = np.minimum(spans / np.maximum(np.hypot(*points[:, :2].T), SMALLEST), width)
+    steepness = max(abs(r.k1), abs(r.k2)) / SMOOTH
+    return r.frame.to_world(
+        points / np.maximum(steepness, 1.0 / np.maximum(share * widths, SMALLEST))[:, None]
+    )
 
 
 def _turning(r: Reconstruction, points: Array, facets: list[Facet]) -> Array:
@@ -158,6 +156,5 @@ def _bends(point: Array, mesh: FacetedSurface) -> Iterator[tuple[float, float]]:
 def _facet(mesh: FacetedSurface, number: int) -> Facet:
     """The face of this number; its normal is 0 if it has no area."""
     points = np.asarray(mesh.corners_of(number), dtype=float)
-    sides = points - points[0]
-    across = np.cross(sides[1:-1], sides[2:]).sum(axis=0)
+    across = np.cross(points[1:-1] - points[0], points[2:] - points[0]).sum(axis=0)
     return Facet(points, across / (float(np.linalg.norm(across)) or 1.0))
