@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 import core
-from tests.surfaces import Exact, ellipsoid
+from tests.surfaces import Exact, ellipsoid, plane
 
 UP = (0.0, 0.0, 1.0)
 
@@ -332,6 +332,13 @@ def test_curvatures_of_flattened_balls_are_seldom_wrongly_said_to_be_those_of_fa
     assert np.median(errors) < 0.155
     assert wrongly <= 2
     assert wrong <= 12  # Patches reach over the rim, where their deviation is as large.
+
+
+@pytest.mark.parametrize(("bend", "few"), [(0.01, False), (0.05, True)])
+def test_a_shape_that_bends_by_less_than_a_patch_may_is_no_doubt(bend, few):
+    r = core.explore(plane(), (0.0, 0.0, 0.0), UP, extent=0.3).result
+    r = replace(r, shape_curvatures=np.array([[-bend / r.radius, 0.0]]))
+    assert any(doubt.code == "facets" for doubt in r.doubts) is few
 
 
 @pytest.mark.parametrize("latitude", [3.4, 5.0, 5.6, 6.8])
