@@ -5,7 +5,7 @@
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -26,7 +26,7 @@ TURNS = np.radians([0.0, 20.0, 40.0])  # The curves, turned by these around the 
 DISTINCT, SMOOTH = math.radians(1.0), math.radians(40.0)
 # if both facets have this share of the wider one's width across it; else one is a fillet. Facets are fine if
 # the one at the point is narrower than this share of the radius.
-MIN_WIDTH_RATIO = 0.25
+MIN_WIDTH_RATIO = 0.15
 NEIGHBOR_STEP = 0.05  # The neighbor across an edge is the facet at this share of the width beyond the edge.
 
 
@@ -68,10 +68,9 @@ def _shape_curvatures(r: Reconstruction, mesh: FacetedSurface) -> list[Array]:
     width = _smooth_width(r.frame.origin, mesh)
     if width < max(MIN_WIDTH_RATIO * r.radius, SMALLEST):
         return []
-    facet, points = cache(lambda face: _facet(mesh, face)), _around(r, TURNING * width)
-    by_turning = _turning(r, points, [facet(mesh.face_near(point)) for point in points])
-    faces_within = [set(map(mesh.face_near, _around(r, share * width))) for share in CORNERS]
-    by_corners = [_of_corners(r, map(facet, faces)) for faces in faces_within]
+    facet, around = cache(lambda face: _facet(mesh, face)), partial(_around, r, mesh, width)
+    by_turning = _turning(r, points := around(TURNING), [facet(mesh.face_near(point)) for point in points])
+    by_corners = [_of_corners(r, map(facet, set(map(mesh.face_near, around(share))))) for share in CORNERS]
     return [by_turning, *(estimate for estimate in by_corners if estimate is not None)]
 
 
@@ -80,16 +79,21 @@ def is_beside_bend(point: Array, mesh: FacetedSurface) -> bool:
     return _smooth_width(point, mesh) > 0.0
 
 
-def _around(r: Reconstruction, reach: float) -> Array:
-    """Points (n, 3) of the world along the curves, out to a length, and these turned around the normal.
+def _around(r: Reconstruction, mesh: FacetedSurface, width: float, share: float) -> Array:
+    """Points (n, 3) of the world along the curves and these turned around the normal, to a share of widths.
 
-    Where facets narrow, as near the tip of a cone, the points end where the patch has turned by SMOOTH.
+    Widths are those of the facet at the point in each direction, and at most the given one. Where facets
+    narrow, as near the tip of a cone, the points end where the patch has turned by SMOOTH.
     """
-    reach = 1.0 / max(abs(r.k1) / SMOOTH, abs(r.k2) / SMOOTH, 1.0 / reach)
-    points = np.vstack([contour.points for contour in r.contours])
-    x, y, z = reach / r.radius * r.frame.to_local(points).T
+    x, y, z = r.frame.to_local(np.vstack([contour.points for contour in r.contours])).T / r.radius
     turned = [(x * c - y * s, x * s + y * c, z) for c, s in zip(np.cos(TURNS), np.sin(TURNS), strict=True)]
-    return r.frame.to_world(np.concatenate(turned, axis=1).T)
+    points, corners = np.concatenate(turned, axis=1).T, mesh.corners_of(mesh.face_near(r.frame.origin))
+    spans = np.ptp(points[:, :2] @ r.frame.to_local(corners)[:, :2].T, axis=1)
+    widths = np.minimum(spans / np.maximum(np.hypot(*points[:, :2].T), SMALLEST), width)
+    steepness = max(abs(r.k1), abs(r.k2)) / SMOOTH
+    return r.frame.to_world(
+        points / np.maximum(steepness, 1.0 / np.maximum(share * widths, SMALLEST))[:, None]
+    )
 
 
 def _turning(r: Reconstruction, points: Array, facets: list[Facet]) -> Array:
@@ -152,6 +156,5 @@ def _bends(point: Array, mesh: FacetedSurface) -> Iterator[tuple[float, float]]:
 def _facet(mesh: FacetedSurface, number: int) -> Facet:
     """The face of this number; its normal is 0 if it has no area."""
     points = np.asarray(mesh.corners_of(number), dtype=float)
-    sides = points - points[0]
-    across = np.cross(sides[1:-1], sides[2:]).sum(axis=0)
+    across = np.cross(points[1:-1] - points[0], points[2:] - points[0]).sum(axis=0)
     return Facet(points, across / (float(np.linalg.norm(across)) or 1.0))

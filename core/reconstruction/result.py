@@ -227,7 +227,7 @@ class Reconstruction(Judged):
     def curvature_covariance(self) -> Array:
         """The covariance of the coefficients of x^2, xy and y^2, (3, 3), in unit radius."""
         # One deviation in each direction: that of the coefficient of xy is larger by the square root of 2.
-        facets = (0.5 * self.radius * max(self._off_shape, default=0.0)) ** 2 * np.diag([1.0, 2.0, 1.0])
+        facets = (0.5 * self.radius * self._facet_std) ** 2 * np.diag([1.0, 2.0, 1.0])
         return self._fitted_covariance + self.bends.covariance + facets
 
     @property
@@ -250,6 +250,12 @@ class Reconstruction(Judged):
         """How far principal curvatures are off each estimate of those of the shape."""
         low, high = sorted((self.k1, self.k2))
         return [max(abs(low - k1), abs(high - k2)) for k1, k2 in self.shape_curvatures.tolist()]
+
+    @property
+    def _facet_std(self) -> float:
+        """How far they may be off: as far as the farthest estimate is, and as estimates are apart."""
+        apart = np.ptp(self.shape_curvatures, axis=0).max() if self._off_shape else 0.0
+        return math.hypot(max(self._off_shape, default=0.0), apart)
 
     @cached_property
     def bends(self) -> Bends:
@@ -368,7 +374,7 @@ class Reconstruction(Judged):
     def _doubting(self) -> Iterator[Doubt]:
         """Reasons to doubt it, the gravest first."""
         useless, radius = status.useless(self.method, self.contours, self.shape_curvatures), self.radius
-        yield from status.about_facets(self._off_shape, self.shape_curvatures)
+        yield from status.about_facets(self._off_shape, self.shape_curvatures, radius)
         stops = stops_at(self.contours, self.frame.origin, AT_POINT * radius)
         yield from status.about_taps(self.taps, any(stop in SURFACE_ENDS for stop in stops), useless)
         if not self.converged:

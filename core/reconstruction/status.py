@@ -40,7 +40,7 @@ FLAT_SHARE, FLAT_COSINE = 0.5, math.cos(math.radians(0.5))
 # of core.scan).
 BENT, BENT_DEVIATIONS = 0.02, 3.0
 # The curvature is that of facets if it is off all estimates of the shape's by this share of the larger one,
-# and by this multiple of what estimates are apart (benchmarks.facets --models).
+# by this multiple of what estimates are apart, and by what bends a patch (benchmarks.facets --models).
 OFF_SHAPE, DISAGREEING = 0.21, 1.5
 DOUBTFUL_GAP = 0.04  # Share of the area that has no surface: near a straight edge it may be 0.03.
 
@@ -86,7 +86,7 @@ def about_taps(taps: Taps | None, is_at_edge: bool, useless: tuple[str, ...]) ->
     yield from beyond("gap", taps.missing, DOUBTFUL_GAP, useless)
 
 
-def about_facets(off: Sequence[float], shape: Array) -> Iterator[Doubt]:
+def about_facets(off: Sequence[float], shape: Array, radius: float) -> Iterator[Doubt]:
     """Whether few facets have other principal curvatures than the shape that they stand for.
 
     off : n numbers, how far the patch's curvatures are off estimates of the shape's; shape : (n, 2), these
@@ -94,7 +94,7 @@ def about_facets(off: Sequence[float], shape: Array) -> Iterator[Doubt]:
     if not off:
         return
     largest, apart = float(np.abs(shape).max()), float(np.ptp(shape, axis=0).max())
-    if min(off) > max(OFF_SHAPE * largest, DISAGREEING * apart):
+    if min(off) > max(OFF_SHAPE * largest, DISAGREEING * apart, BENT / radius):
         yield Doubt("facets", max(off) / largest, OFF_SHAPE)
 
 
