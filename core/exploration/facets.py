@@ -69,8 +69,10 @@ def _shape_curvatures(r: Reconstruction, mesh: FacetedSurface) -> list[Array]:
     if width < max(MIN_WIDTH_RATIO * r.radius, SMALLEST):
         return []
     facet, around = cache(lambda face: _facet(mesh, face)), partial(_around, r, mesh, width)
-    by_turning = _turning(r, points := around(TURNING), [facet(mesh.face_near(point)) for point in points])
-    by_corners = [_of_corners(r, map(facet, set(map(mesh.face_near, around(share))))) for share in CORNERS]
+    points = around(TURNING)
+    by_turning = _turning(r, points, [facet(mesh.face_near(point)) for point in points])
+    faces_within = [set(map(mesh.face_near, around(share))) for share in CORNERS]
+    by_corners = [_of_corners(r, map(facet, faces)) for faces in faces_within]
     return [by_turning, *(estimate for estimate in by_corners if estimate is not None)]
 
 
