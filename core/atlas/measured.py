@@ -185,7 +185,7 @@ def _contacts(
     if not known.all():
         normals[~known] = oriented(points, planes, np.where(known[:, None], normals, 0.0), up)[~known]
     else:
-        _require_one_side(points, normals)
+        _require_one_side(points, normals, planes.links)
     doubts = list(doubts_of(points, normals, planes))
     normals[~known] = sharpened(points, normals, planes)[~known]
     if balls.any():
@@ -220,17 +220,14 @@ def _least_radius(points: Array) -> float:
     return radius
 
 
-def _require_one_side(points: Array, normals: Array) -> None:
-    """Raises ValueError if many measured normals (n, 3) of neighboring points (n, 3) face opposite ways.
+def _require_one_side(points: Array, normals: Array, links: Indices) -> None:
+    """Raises ValueError if many measured normals (n, 3) of linked points (n, 3) face opposite ways.
 
     For points p1 and p2 of a sphere with normals n1 and n2, (n1 + n2) . (p2 - p1) = 0, and nearly so on any
     smooth surface. If n2 has the wrong sign, (n1 - n2) . (p2 - p1) is as small. For the two sides of a wall,
     which rightly face opposite ways, it is twice the thickness.
     """
-    from scipy.spatial import cKDTree
-
-    near = cKDTree(points).query(points, min(ABREAST + 1, len(points)))[1][:, 1:]
-    chords, others = points[near] - points[:, None], normals[near]
+    chords, others = points[links] - points[:, None], normals[links]
     facing = np.einsum("nki,ni->nk", others, normals)
     sums = normals[:, None] + np.copysign(1.0, facing)[..., None] * others
     apart = np.abs(row_dot(chords, sums))
@@ -290,7 +287,7 @@ def _off_enclosed(
     some = np.flatnonzero((row_dot(moves, moves) > most**2) & (missed < MISSED * most))
     corners, away = points + moves, np.zeros(len(points))
     _, _, corner_off, _ = cloud.enclosing(corners[some], normals[some], most, 0.0 * corners[some])
-    some = some[np.abs(corner_off) < MISSED * most]
+    some = some[corner_off < MISSED * most]
     away[some] = np.linalg.norm(atlas.reference.feet(corners[some])[0] - corners[some], axis=1)
     where = np.where((away > np.abs(off))[:, None], corners, points)
     return np.maximum(away, np.abs(off)), where, nearest
@@ -386,7 +383,7 @@ class _Cloud(NamedTuple):
         is_wrong = ((fronts > CONTRADICTED * most) & ~np.swapaxes(is_front, 1, 2)).any(axis=2)
         is_wrong[:, 0] = False
         is_convex = ~(is_front[:, 0] | is_front[:, :, 0] | is_wrong)
-        is_concave = is_front[:, 0] & is_front[:, :, 0] & (row_dot(ups, ups[:, :1]) < AGREE)
+        is_concave = is_front[:, 0] & is_front[:, :, 0]
         off = np.where(np.einsum("nki,ni->nk", ups, sheets) > AGREE, 0.0, above)
         front = np.where(is_convex, off, -np.inf).max(axis=1)
         off = np.minimum(front, np.where(is_concave, off, np.inf).min(axis=1))
@@ -471,10 +468,17 @@ class _Cloud(NamedTuple):
         return None, 0
 
     def explains(self, r: Reconstruction, some: Indices) -> bool:
-        """Whether a patch explains some of the contacts, to which it was fitted, within their noise."""
-        far = np.zeros(len(self.contacts.points), dtype=bool)
-        far[some] = too_far(self.distances(r, some), self.noise)
-        return are_few(far[some], far[self.contacts.links[some]].any(axis=1))
+        """Whether a patch explains some of the contacts, to which it was fitted, within their noise.
+
+        What noise hides at each contact, such as a low step, the mean of neighbors shows.
+        """
+        links, off = self.contacts.links[some], np.zeros(len(self.contacts.points))
+        off[some] = self.distances(r, some)
+        far = too_far(off, self.noise)
+        if far.any():  # These pull the patch, and means around them are off, too.
+            return are_few(far[some], far[links].any(axis=1))
+        sums = off[some] + off[links].sum(axis=1)
+        return not too_far(sums / np.sqrt(1.0 + links.shape[1]), self.noise).any()
 
     def distances(self, r: Reconstruction, some: Indices) -> Array:
         """Distances (n,) of some of the contacts from a patch, measured from its tangent planes."""

@@ -189,23 +189,27 @@ def _winding_signs(
         away = np.maximum(np.linalg.norm(off, axis=1), np.sqrt(areas[at]))
         total = np.append(0.0, np.cumsum(areas * row_dot(off, normals) / away**3)) / (4.0 * np.pi)
         numbers[k] = total[ends] - total[starts]
-    least = CLEAR * np.minimum(counts, n - counts) / n
-    turn = np.copysign(1.0, numbers[:, 0].mean())
-    numbers, signs = turn * numbers, np.full(n, turn)
+    least, signs = np.maximum(CLEAR * np.minimum(counts, n - counts) / n, 1e-9), np.ones(n)
     while True:
-        rest = numbers[:, :1] - numbers
-        falls = np.stack([numbers * (rest - 0.5), rest * (numbers - 0.5)]).mean(axis=1) * 4.0
+        total = numbers[:, :1]
+        falls = _off_half(total) - _off_half(total - 2.0 * numbers)
         falls[falls < least] = 0.0
-        is_rest, best = np.unravel_index(np.argmax(falls), falls.shape)
-        if falls[is_rest, best] <= 1e-9:
-            return signs, float(numbers[:, 0].mean())
+        best = np.argmax(falls)
+        if not falls[best]:
+            return signs * np.copysign(1.0, total.mean()), float(abs(total.mean()))
         is_in = (starts >= starts[best]) & (ends <= ends[best])
         is_around = (starts <= starts[best]) & (ends >= ends[best]) & ~is_in
         numbers[:, is_around] -= 2.0 * numbers[:, [best]]
         numbers[:, is_in] *= -1.0
         signs[starts[best] : ends[best]] *= -1.0
-        if is_rest:
-            numbers, signs = -numbers, -signs
+
+
+def _off_half(numbers: Array) -> Array:
+    """The mean squares by which columns of winding numbers (p, m) are off a half, or all off minus a half.
+
+    They are less by a quarter, the square of a half.
+    """
+    return (numbers**2).mean(axis=0) - np.abs(numbers.mean(axis=0))
 
 
 def _global_sign(normals: Array, known: Array | None, up: Array | None, number: float) -> float:

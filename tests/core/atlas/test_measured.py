@@ -198,6 +198,24 @@ def test_no_patch_spans_a_notch_whose_walls_were_felt():
         assert distance == pytest.approx(np.full(40, out), abs=2e-3)
 
 
+def test_a_patch_does_not_explain_what_the_noise_hides_from_single_contacts_but_not_from_their_mean():
+    contacts = angle_atlas().contacts
+    tree = cKDTree(contacts.points)
+    cloud, (_, i) = measured._Cloud(contacts, tree, 5e-4, None), tree.query((0.2, 0.7, 0.4))
+    (r,), some = cloud.patches([i], 0.3), cloud.same_sheet(i, 0.3)
+    near, up = contacts.links[i], contacts.normals[i]
+    for which, heights, is_explained in (
+        (near, 0.0, True),
+        (near, 2.0, False),
+        (near, np.where(np.arange(len(near)) % 2, 2.0, -2.0), True),
+        (near[:1], 100.0, True),
+        (near[:2], 100.0, False),
+    ):
+        points = contacts.points.copy()
+        points[which] += 5e-4 * np.broadcast_to(heights, len(which))[:, None] * up
+        assert cloud._replace(contacts=contacts._replace(points=points)).explains(r, some) == is_explained
+
+
 def test_a_patch_goes_on_from_its_last_contact_to_the_edge_of_its_wall():
     contacts = angle_atlas().contacts
     tree = cKDTree(contacts.points)
