@@ -478,7 +478,8 @@ class _Cloud(NamedTuple):
         if far.any():  # These pull the patch, and means around them are off, too.
             return are_few(far[some], far[links].any(axis=1))
         sums = off[some] + off[links].sum(axis=1)
-        return not too_far(sums / np.sqrt(1.0 + links.shape[1]), self.noise).any()
+        squares = (links[:, :, None] == links[:, None]).sum(axis=(1, 2))  # A link may come twice.
+        return not too_far(sums, self.noise * np.sqrt(1.0 + squares)).any()
 
     def distances(self, r: Reconstruction, some: Indices) -> Array:
         """Distances (n,) of some of the contacts from a patch, measured from its tangent planes."""
