@@ -128,6 +128,9 @@ def _judged(
     off_enclosed = partial(_off_enclosed, atlas, cloud, limit)
     between, spots, alike = yield from chunked(off_enclosed, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
     worst, widest = _largest_cluster(far, distances, contacts.links), np.argsort(-between, kind="stable")
+    surface = list(beyond("noise", fit_noise, most))
+    if not atlas.uncovered and atlas.reference.indicator.values[0, 0, 0] > 0.0:  # It is inside there.
+        surface.append(Doubt("cavity"))
     off = _doubts_of_contacts(contacts, distances, far, worst, is_turned, limit)
     gaps = widest[:0] if atlas.uncovered else widest[between[widest] > limit]
     sparse = [Doubt("sparse", between[i], limit, (place_text(spots[[i]]),)) for i in gaps[:1]]
@@ -136,7 +139,7 @@ def _judged(
     places += [(spots[i], contacts.normals[alike[i]]) for i in gaps]
     return replace(
         atlas,
-        contradictions=(*doubts, *_doubts_of_surface(atlas, fit_noise, most), *off, *sparse),
+        contradictions=(*doubts, *surface, *off, *sparse),
         agreement=_agreement(contacts, distances, far, worst, fit_noise),
         unexplained=tuple(place_at(*place, radius) for place in places),
     )
@@ -291,13 +294,6 @@ def _off_enclosed(
     away[some] = np.linalg.norm(atlas.reference.feet(corners[some])[0] - corners[some], axis=1)
     where = np.where((away > np.abs(off))[:, None], corners, points)
     return np.maximum(away, np.abs(off)), where, nearest
-
-
-def _doubts_of_surface(atlas: Atlas, noise: float, most: float) -> Iterator[Doubt]:
-    """Whether contacts scatter by a noise above `most`, or surround a cavity."""
-    yield from beyond("noise", noise, most)
-    if not atlas.uncovered and atlas.reference.indicator.values[0, 0, 0] > 0.0:  # It is inside there.
-        yield Doubt("cavity")
 
 
 def _largest_cluster(far: NDArray[np.bool_], distances: Array, links: Indices) -> Indices:

@@ -28,7 +28,6 @@ SHARPENINGS = 3  # and is passed on from neighbor to neighbor this often.
 LINKS = 12  # A contact is linked with this many of its neighbors.
 AT_ONCE = 20_000  # This many contacts are taken at once.
 BEND = 0.1  # Links along which the surface goes on come before those around edges and across gaps.
-LEAST_VOTE = 1e-6  # No vote counts less.
 OPPOSED = -0.3  # A link contradicts the sides of its contacts if its cosine is less.
 DOUBTED = 0.02  # Not more contacts than this share may contradict their neighbors,
 CONFUSED = 0.05  # and not more than this share may have the other side of a wall among their neighbors.
@@ -153,7 +152,7 @@ def _propagated_signs(
     # Neighbors that have each other as a neighbor count twice, so they are more likely of one wall.
     votes = coo_matrix((cosine / weights, (np.minimum(i, j), np.maximum(i, j))), (n, n)).tocsr()
     votes.sum_duplicates()
-    votes.data = 1.0 / np.maximum(np.abs(votes.data), LEAST_VOTE)
+    votes.data = -1.0 - np.abs(votes.data)  # The largest come first; none is 0, which would be no link.
     order, before = depth_first_order(minimum_spanning_tree(votes), 0, directed=False)
     cosine, _ = reflection_agreement(points, normals, before[order[1:]], order[1:])
     links = list(zip(order[1:].tolist(), before[order[1:]].tolist(), cosine.tolist(), strict=True))
