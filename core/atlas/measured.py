@@ -51,8 +51,8 @@ OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one
 TURNED = 0.25
 GROWN = 0.012  # Without a tolerance, patches grow up to this mean deviation, as a share of the radius.
 COARSEST = 0.1  # The tolerance is at most this share of the size: larger patches do not show the object.
-# Contacts and surface are off each other by at most this share of the size. No evenly spread contacts are "ok"
-# and off by more (python -m benchmarks.measured --even --first 3); without it, some were, by up to 14 %.
+# Contacts and surface are off each other by at most this share of the size. No evenly spread contacts are
+# "ok" and off by more (python -m benchmarks.measured --even --first 3); without it some were, by up to 14 %.
 MOST_OFF = 0.02
 # Planes of contacts meet where they differ by this sine at least, and each passes by within this share of
 # MOST_OFF: otherwise those of the two walls of a thin bowl would meet between these.
