@@ -222,9 +222,9 @@ def hollow_ball(inner):
     return both(ball(1.0), (vertices, triangles[:, ::-1]))
 
 
-def cad_block():
-    """The machined block; its vertices are merged, because those of its file are up to 1e-8 apart."""
-    scan = Scan(scan_files("cad_block")[0])
+def scanned(words):
+    """A scan; its vertices are merged, because those of its file are up to 1e-8 apart."""
+    scan = Scan(scan_files(words)[0])
     _, first, merged = np.unique(scan.points.round(6), axis=0, return_index=True, return_inverse=True)
     return scan.points[first], merged.ravel()[scan.faces]
 
@@ -251,7 +251,7 @@ def objects(tolerance):
         "overlapping balls": (0.16, lambda: overlapping_balls(0.05)),
         "balls with a gap": (0.24, lambda: apart_balls(GAP * tolerance)),
         HOLLOW: (0.2, lambda: hollow_ball(0.6)),
-        "cad_block": (0.02, cad_block),
+        "cad_block": (0.02, lambda: scanned("cad_block")),
     }
 
 

@@ -18,11 +18,13 @@ parallel planes, seeded. It prints Markdown tables:
 (c) with `--features`, dents, bumps, grooves and steps of five heights from 10 to 100 noises on three objects,
     along the ways from their middles: the verdict, the share of the contacts in the feature that are off by
     more than five deviations and noises, their mean distance in noises, and that of the others;
-(d) with `--even`, few contacts that are spread evenly, with normals and without: the verdict, and how far
-    the surface is off the object, and the object off the surface, in percent of the size.
+(d) with `--even`, few contacts that are spread evenly on these, a rounded cube and closed scans, with normals
+    and without, with a tolerance and without: the verdict, and how far the surface is off the object, and the
+    object off the surface, in percent of the size.
 """
 
 import sys
+from functools import partial as bound
 from itertools import product
 
 import numpy as np
@@ -38,10 +40,12 @@ from .atlas_shapes import (
     arc,
     away,
     box,
+    filleted,
     hollow_ball,
     objects,
     overlapping_balls,
     revolved,
+    scanned,
     square_ring,
     tee,
     things,
@@ -78,6 +82,11 @@ OBJECTS = {
     "T": lambda: tee(0.3, 0.7, 1, 0.3, 0.4),
     "hollow ball": lambda: hollow_ball(0.6),
 }
+ROUNDED = {"rounded cube": lambda: filleted(1, 1, 1, 0.2)}
+SCANS = {
+    name: bound(scanned, name) for name in ("asteroid", "bottle", "lemon", "pear", "stone_flake", "shell")
+}
+TOLERANCES = (None, 0.02)  # as a share of the size
 
 
 def rotation(rng):
@@ -293,13 +302,13 @@ def print_features(only, first):
 
 def print_even(only, first):
     rows = []
-    for thing, count in product(things(OBJECTS, only), EVEN):
+    for thing, count in product(things(OBJECTS | ROUNDED | SCANS, only), EVEN):
         rng, name = np.random.default_rng(first), thing.name
         object_points, tried = thing.points(CHECKED, rng)[0], thing.points(10 * count, rng)
         points, normals = (values[spread(tried[0], count)] for values in tried)
-        for some in (normals, None):
+        for some, tolerance in product((normals, None), TOLERANCES):
             try:
-                atlas = core.atlas_of([core.Contour(points, normals=some)])
+                atlas = core.atlas_of([core.Contour(points, normals=some)], tolerance=tolerance)
             except ValueError as error:
                 print(f"{name} {count}: {error}", file=sys.stderr, flush=True)
                 continue
@@ -308,10 +317,11 @@ def print_even(only, first):
                 away(thing.tree, surface.mesh.vertices).max(),
                 np.linalg.norm(surface.feet(object_points)[0] - object_points, axis=1).max(),
             ]
-            measured = "yes" if some is not None else "no"
-            rows.append([name, str(count), measured, atlas.status, *(f"{100.0 * most:.2f}" for most in off)])
+            given = "yes" if some is not None else "no", str(tolerance or "")
+            rows.append([name, str(count), *given, atlas.status, *(f"{100.0 * most:.2f}" for most in off)])
             print(*rows[-1], atlas.message, file=sys.stderr, flush=True)
-    table(["object", "even contacts", "normals", "status", "% surface off", "% object off"], rows)
+    head = ["object", "even contacts", "normals", "tolerance", "status", "% surface off", "% object off"]
+    table(head, rows)
 
 
 def outward(points, normals):

@@ -28,7 +28,6 @@ SHARPENINGS = 3  # and is passed on from neighbor to neighbor this often.
 LINKS = 12  # A contact is linked with this many of its neighbors.
 AT_ONCE = 20_000  # This many contacts are taken at once.
 BEND = 0.1  # Links along which the surface goes on come before those around edges and across gaps.
-LEAST_VOTE = 1e-6  # No vote counts less.
 OPPOSED = -0.3  # A link contradicts the sides of its contacts if its cosine is less.
 DOUBTED = 0.02  # Not more contacts than this share may contradict their neighbors,
 CONFUSED = 0.05  # and not more than this share may have the other side of a wall among their neighbors.
@@ -153,7 +152,7 @@ def _propagated_signs(
     # Neighbors that have each other as a neighbor count twice, so they are more likely of one wall.
     votes = coo_matrix((cosine / weights, (np.minimum(i, j), np.maximum(i, j))), (n, n)).tocsr()
     votes.sum_duplicates()
-    votes.data = 1.0 / np.maximum(np.abs(votes.data), LEAST_VOTE)
+    votes.data = -1.0 - np.abs(votes.data)  # The largest come first; none is 0, which would be no link.
     order, before = depth_first_order(minimum_spanning_tree(votes), 0, directed=False)
     cosine, _ = reflection_agreement(points, normals, before[order[1:]], order[1:])
     links = list(zip(order[1:].tolist(), before[order[1:]].tolist(), cosine.tolist(), strict=True))
@@ -189,23 +188,27 @@ def _winding_signs(
         away = np.maximum(np.linalg.norm(off, axis=1), np.sqrt(areas[at]))
         total = np.append(0.0, np.cumsum(areas * row_dot(off, normals) / away**3)) / (4.0 * np.pi)
         numbers[k] = total[ends] - total[starts]
-    least = CLEAR * np.minimum(counts, n - counts) / n
-    turn = np.copysign(1.0, numbers[:, 0].mean())
-    numbers, signs = turn * numbers, np.full(n, turn)
+    least, signs = np.maximum(CLEAR * np.minimum(counts, n - counts) / n, 1e-9), np.ones(n)
     while True:
-        rest = numbers[:, :1] - numbers
-        falls = np.stack([numbers * (rest - 0.5), rest * (numbers - 0.5)]).mean(axis=1) * 4.0
+        total = numbers[:, :1]
+        falls = _off_half(total) - _off_half(total - 2.0 * numbers)
         falls[falls < least] = 0.0
-        is_rest, best = np.unravel_index(np.argmax(falls), falls.shape)
-        if falls[is_rest, best] <= 1e-9:
-            return signs, float(numbers[:, 0].mean())
+        best = np.argmax(falls)
+        if not falls[best]:
+            return signs * np.copysign(1.0, total.mean()), float(abs(total.mean()))
         is_in = (starts >= starts[best]) & (ends <= ends[best])
         is_around = (starts <= starts[best]) & (ends >= ends[best]) & ~is_in
         numbers[:, is_around] -= 2.0 * numbers[:, [best]]
         numbers[:, is_in] *= -1.0
         signs[starts[best] : ends[best]] *= -1.0
-        if is_rest:
-            numbers, signs = -numbers, -signs
+
+
+def _off_half(numbers: Array) -> Array:
+    """The mean squares by which columns of winding numbers (p, m) are off a half, or all off minus a half.
+
+    They are less by a quarter, the square of a half.
+    """
+    return (numbers**2).mean(axis=0) - np.abs(numbers.mean(axis=0))
 
 
 def _global_sign(normals: Array, known: Array | None, up: Array | None, number: float) -> float:

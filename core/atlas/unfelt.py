@@ -31,9 +31,8 @@ def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[RimPlace
     mesh, unfelt, places = reference.mesh, reference.unfelt, list[RimPlace]()
     if unfelt is None or not reference.is_open.any():
         return tuple(places)
-    ups = mesh.normals[reference.is_open]
-    some = ups.any(axis=1)  # Vertices of triangles without an area have no normal.
-    rim, ups = mesh.vertices[reference.is_open][some], ups[some]
+    which = reference.is_open & mesh.normals.any(axis=1)  # Triangles without an area have no normal.
+    rim, ups = mesh.vertices[which], mesh.normals[which]
     radii = charts.radii[cKDTree(charts.origins).query(rim)[1]]
     # A vertex has a third of the area of its triangles.
     areas = np.linalg.norm(triangle_cross(unfelt.vertices[unfelt.triangles]), axis=1).repeat(3) / 6.0

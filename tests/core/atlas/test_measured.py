@@ -4,6 +4,7 @@
 
 import re
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -198,6 +199,23 @@ def test_no_patch_spans_a_notch_whose_walls_were_felt():
         assert distance == pytest.approx(np.full(40, out), abs=2e-3)
 
 
+def test_a_patch_does_not_explain_what_the_noise_hides_from_single_contacts_but_not_from_their_mean():
+    contacts = angle_atlas().contacts
+    tree = cKDTree(contacts.points)
+    cloud, (_, i) = measured._Cloud(contacts, tree, 5e-4, None), tree.query((0.2, 0.7, 0.4))
+    (r,), some = cloud.patches([i], 0.3), cloud.same_sheet(i, 0.3)
+    near, up = np.unique(contacts.links[i]), contacts.normals[i]
+    for which, height, is_explained in (
+        (near, 0.0, True),
+        (near, 2.0, False),
+        (near[:1], 100.0, True),
+        (near[:2], 100.0, False),
+    ):
+        points = contacts.points.copy()
+        points[which] += 5e-4 * height * up
+        assert cloud._replace(contacts=contacts._replace(points=points)).explains(r, some) == is_explained
+
+
 def test_a_patch_goes_on_from_its_last_contact_to_the_edge_of_its_wall():
     contacts = angle_atlas().contacts
     tree = cKDTree(contacts.points)
@@ -270,27 +288,123 @@ def test_a_tip_that_is_cut_off_is_a_doubt_though_no_plane_is_far_from_the_surfac
             assert atlas.next_touch().point == pytest.approx((0.0, 0.0, 1.0), abs=1e-3)
 
 
-def off_edge(place, noise=0.0, odd=None):
-    """How far a place is off an edge of two walls, up to which one was felt; one contact may be odd there."""
-    out = np.array([0.1, 0.12, 0.14, 0.16])
-    along, none = np.array([-0.03, 0.01, 0.03, -0.01]), np.zeros(4)
-    points = np.vstack([np.column_stack([-out, along, none]), np.column_stack([none, along, -out])])
-    normals = np.repeat(np.eye(3)[[2, 0]], 4, axis=0)
-    points[:4, 0] = noise or points[:4, 0]
-    normals[1] = normals[1] if odd is None else odd
-    contacts = measured.MeasuredContacts(points, normals, np.ones(8), np.zeros((8, 1), dtype=int))
-    cloud, place = measured._Cloud(contacts, cKDTree(points), noise, None), np.array([place])
-    return cloud.enclosing(place, np.array([[1.0, 0.0, 0.0]]), 0.04, 0.0 * place)[2][0]
+X, Y, Z = np.eye(3)
+
+
+def cloud_of(walls, noise=0.0):
+    """A cloud of contacts, given as points (3,) and normals (3,); copies of the first make them eight."""
+    walls = walls + walls[:1] * (measured.ABREAST - len(walls))
+    points, normals = (np.array(values, dtype=float) for values in zip(*walls, strict=True))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    links = np.zeros((len(walls), 1), dtype=int)
+    contacts = measured.MeasuredContacts(points, normals, np.ones(len(walls)), links)
+    return measured._Cloud(contacts, cKDTree(contacts.points), noise, None)
+
+
+def off_enclosed(walls, place, up=Z, noise=0.0):
+    """How far a place that faces up is off what few contacts enclose, where planes count up to .01."""
+    place = np.array([place])
+    most = 0.01 / measured.CONTRADICTED
+    return cloud_of(walls, noise).enclosing(place, np.array([up]), most, 0.0 * place)[2][0]
+
+
+def edge_walls(odd=None, out=None):
+    """Four contacts on each of two walls to an edge: one may have an odd normal, four be on the other."""
+    walls = [((-x if out is None else out, y, 0.0), Z) for x, y in zip(OUT, ALONG, strict=True)]
+    walls[1] = walls[1][0], Z if odd is None else odd
+    return walls + [((0.0, y, -z), X) for z, y in zip(OUT, ALONG, strict=True)]
+
+
+OUT, ALONG = (0.1, 0.12, 0.14, 0.16), (-0.03, 0.01, 0.03, -0.01)
 
 
 def test_a_fin_along_a_wall_is_off_the_other_within_the_noise_of_its_contacts():
-    for noise in (0.0, 0.004):
-        assert off_edge((0.0, 0.0, 0.03), noise) == pytest.approx(0.03)
+    for walls, noise in ((edge_walls(), 0.0), (edge_walls(out=0.004), 0.004)):
+        assert off_enclosed(walls, (0.0, 0.0, 0.03), X, noise) == pytest.approx(0.03)
 
 
 def test_a_plane_that_contacts_of_its_wall_are_in_front_of_encloses_nothing():
     for odd in (None, (0.6, 0.0, 0.8)):
-        assert off_edge((0.0, 0.0, 0.0), odd=odd) == pytest.approx(0.0, abs=1e-12)
+        assert off_enclosed(edge_walls(odd), (0.0, 0.0, 0.0), X) == pytest.approx(0.0, abs=1e-12)
+
+
+TOP = ((-0.03, 0.0, 0.0), Z)
+
+
+@pytest.mark.parametrize(
+    ("side", "place", "off"),
+    [
+        ((0.0, 0.0, -0.05), (0.02, 0.0, 0.0), 0.02),  # convex
+        ((0.0, 0.0, 0.05), (0.02, 0.0, 0.0), 0.0),  # The side goes on above the top.
+        ((-0.1, 0.0, -0.05), (0.02, 0.0, 0.0), 0.0),  # The top goes on beyond the side.
+        ((-0.035, 0.0, -0.05), (0.02, 0.0, 0.0), 0.0),
+        ((-0.1, 0.0, 0.05), (-0.09, 0.0, 0.03), 0.01),  # concave
+        ((0.0, 0.0, 0.05), (-0.09, 0.0, 0.03), 0.03),
+        ((-0.1, 0.0, -0.05), (-0.09, 0.0, 0.03), 0.03),
+    ],
+)
+def test_walls_enclose_a_place_if_both_are_behind_or_in_front_of_each_other(side, place, off):
+    assert off_enclosed([TOP, (side, X)], place) == pytest.approx(off)
+
+
+@pytest.mark.parametrize(("step", "off"), [(0.008, 0.02), (0.012, 0.008)])
+def test_a_plane_may_be_contradicted_by_a_share_of_what_counts(step, off):
+    walls = [TOP, ((0.0, 0.0, -0.05), X), ((step, 0.05, -0.06), X)]
+    assert off_enclosed(walls, (0.02, 0.0, 0.0)) == pytest.approx(off)
+
+
+def test_planes_of_two_walls_of_a_notch_do_not_contradict_each_other():
+    walls = [((-0.03, -0.05, 0.0), Z), ((0.0, 0.1, -0.1), X), ((0.1, 0.0, -0.1), Y)]
+    assert off_enclosed(walls, (0.03, -0.05, 0.0)) == pytest.approx(0.03)
+
+
+def test_the_nearest_plane_encloses_even_if_it_is_contradicted():
+    walls = [((0.0, 0.0, 0.0), (0.6, 0.0, 0.8)), ((0.04, 0.0, 0.0), Z), ((0.06, 0.0, 0.0), Z)]
+    assert off_enclosed(walls, (0.0, 0.0, 0.02), (0.6, 0.0, 0.8)) == pytest.approx(0.016)
+
+
+def corner_of(walls, place, most=0.04):
+    """Where what few contacts enclose is farthest from a surface of one place, far from a ball."""
+    atlas = SimpleNamespace(charts=ball_atlas().charts, reference=SimpleNamespace(feet=lambda _: (place,)))
+    far = [(np.array(point) + 5.0 * Z, up) for point, up in walls]
+    place = np.array([place]) + 5.0 * Z
+    return measured._off_enclosed(atlas, cloud_of(far), most, place, Z[None])[1][0] - 5.0 * Z
+
+
+@pytest.mark.parametrize(("slope", "ridge"), [(0.9, -0.1), (1.1, 0.0)])
+def test_planes_meet_if_they_differ_by_more_than_contacts_normals_may(slope, ridge):
+    slope *= measured.MEETING
+    walls = [
+        ((side * 0.3, y, -0.3 * slope), (side * slope, 0.0, 1.0)) for side in (-1, 1) for y in (-0.1, 0, 0.1)
+    ]
+    assert corner_of(walls, (-0.1, 0.0, -0.3 * slope))[0] == pytest.approx(ridge, abs=1e-9)
+
+
+def pyramid(shift=0.0, heights=(0.7, 0.72)):
+    """Contacts on four walls that meet in (0, 0, 1), one of which is moved outward."""
+    ways = [np.array([np.cos(turn), np.sin(turn), 0.0]) for turn in 0.5 * np.pi * np.arange(4)]
+    walls = [(0.5 * (1.0 - z) * way + z * Z, way + 0.5 * Z) for way in ways for z in heights]
+    moved = shift * walls[0][1] / np.linalg.norm(walls[0][1])
+    return [(point + moved * (k < len(heights)), up) for k, (point, up) in enumerate(walls)]
+
+
+@pytest.mark.parametrize(("shift", "is_met"), [(0.04, True), (0.07, False)])
+def test_walls_meet_in_a_tip_if_all_pass_it_within_half_of_what_counts(shift, is_met):
+    top = corner_of(pyramid(shift), (0.0, 0.0, 0.8))
+    assert (top[2] > 0.9) == is_met
+
+
+@pytest.mark.parametrize(("most", "counts"), [(0.19, True), (0.21, False)])
+def test_a_tip_counts_if_it_is_farther_than_what_counts(most, counts):
+    top = corner_of(pyramid(), (0.0, 0.0, 0.8), most)
+    assert (top[2] > 0.9) == counts
+
+
+@pytest.mark.parametrize(("height", "counts"), [(0.97, False), (0.985, True)])
+def test_a_tip_counts_if_no_contact_that_is_near_it_is_in_front_of_it(height, counts):
+    cap = [((0.01 * k, 0.01, height), Z) for k in range(8)]
+    top = corner_of(pyramid() + cap, (0.0, 0.0, 0.7))
+    assert (top[2] > 0.9) == counts
 
 
 def test_no_fin_along_a_wall_goes_on_past_the_edges_of_few_contacts():
