@@ -473,9 +473,10 @@ class _Cloud(NamedTuple):
         far = too_far(off, self.noise)
         if far.any():  # These pull the patch, and means around them are off, too.
             return are_few(far[some], far[links].any(axis=1))
-        sums = off[some] + off[links].sum(axis=1)
-        squares = (links[:, :, None] == links[:, None]).sum(axis=(1, 2))  # A link may come twice.
-        return not too_far(sums, self.noise * np.sqrt(1.0 + squares)).any()
+        links = np.sort(links, axis=1)
+        is_first = np.diff(links, axis=1, prepend=-1) > 0  # A link may come twice.
+        sums = off[some] + np.where(is_first, off[links], 0.0).sum(axis=1)
+        return not too_far(sums, self.noise * np.sqrt(1.0 + is_first.sum(axis=1))).any()
 
     def distances(self, r: Reconstruction, some: Indices) -> Array:
         """Distances (n,) of some of the contacts from a patch, measured from its tangent planes."""
