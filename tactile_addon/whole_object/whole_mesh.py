@@ -67,8 +67,8 @@ class GrowingPatches:
 
     def add(self, explored: Sequence[core.Exploration], rims: Sequence[Array]) -> None:
         """Shows the patches of these, too, up to their rims, unless somebody has deleted the object."""
-        obj = self._object()
-        if obj is None or not explored:
+        objects = self._objects()
+        if not objects or not explored:
             return
         for r, rim in zip((each.result for each in explored), rims, strict=True):
             points, mean_curvature = _disk(r, rim)
@@ -82,14 +82,15 @@ class GrowingPatches:
         triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
         shades = colors.shades(np.concatenate(mean_curvatures), bend_range(bends, areas, self._size))
         shades.reshape(-1, count, 4)[:, -SPOKES:] = RIM_COLOR
-        fill(obj.data, np.concatenate(placed), triangles, [(COLOR, shades)])
+        fill(objects[0].data, np.concatenate(placed), triangles, [(COLOR, shades)])
 
     def remove(self) -> None:
         """Deletes the object, if it is still there."""
-        patch_object.remove_objects([*filter(None, [self._object()])])
+        patch_object.remove_objects(self._objects())
 
-    def _object(self) -> Object | None:
-        return next((obj for obj in bpy.data.objects if obj.session_uid == self._uid), None)
+    def _objects(self) -> list[Object]:
+        """The object, or none if somebody has deleted it."""
+        return [obj for obj in bpy.data.objects if obj.session_uid == self._uid]
 
 
 def _disk(r: core.Reconstruction, rim: Array) -> tuple[Array, Array]:
