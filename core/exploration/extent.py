@@ -111,7 +111,7 @@ class Touch:
             if method != "bayes":
                 r = yield from _fitted(explored.contours)
                 shape = explored.result.shape_curvatures
-                explored = replace(explored, result=replace(r, shape_curvatures=shape))
+                explored = replace(explored, result=r.judged_with(shape_curvatures=shape))
         else:
             explored = yield from self._felt(extent / CONTACTS, CONTACTS)
         explored = self._with_taps(explored)
@@ -149,9 +149,9 @@ class Touch:
                 explored = yield from self._felt(*rung)
             except DegenerateCurvesError:
                 continue
-            if _is_sure(explored, self.options):
+            if _is_sure(explored.result, self.options) and _explains(explored, self.options):
                 explored = self._with_taps(explored)
-                if _is_sure(explored, self.options):
+                if _is_sure(explored.result, self.options):
                     return explored
             tried.append(explored)
             if _are_shorter_worse(explored.result):
@@ -174,7 +174,7 @@ class Touch:
         # The shortest half curves lie in the fewest facets, which give curvatures that the shape may have.
         shortest = min(tried, key=lambda e: e.extent).result
         shape = with_facets(shortest, self.surface).shape_curvatures
-        judged = [replace(e, result=replace(e.result, shape_curvatures=shape)) for e in tried]
+        judged = [replace(e, result=e.result.judged_with(shape_curvatures=shape)) for e in tried]
         return min(judged, key=lambda e: (e.result.status != OK, max(e.result.k1_std, e.result.k2_std)))
 
     def _roughness(self, rung: tuple[float, int]) -> float:
@@ -229,8 +229,7 @@ class Touch:
             return explored
         taps, contacts = tapped(self.surface, r, np.concatenate(self.tapped))
         self.tapped.append(contacts)
-        r = replace(r, taps=taps, known_height_std=r.mean_height_std)
-        return replace(explored, result=with_facets(r, self.surface))
+        return replace(explored, result=with_facets(r.judged_with(taps=taps), self.surface))
 
     def _followed(self, step: float, extent: float) -> list[Contour]:
         """The contours of the planes with contacts this step apart, at least to an extent."""
@@ -282,13 +281,12 @@ def _are_shorter_worse(r: Reconstruction) -> bool:
     return is_noisy or (r.gravest is not None and r.gravest.code == "facets" and len(r.doubts) == 1)
 
 
-def _is_sure(explored: Exploration, options: ExplorationOptions) -> bool:
-    """Whether a touch is as certain as the options require, and its patch explains contacts and taps."""
-    r = explored.result
+def _is_sure(r: Reconstruction, options: ExplorationOptions) -> bool:
+    """Whether a patch is as certain as the options require, and taps show the surface there."""
+    if options.largest_std:
+        return r.mean_height_std <= options.largest_std
     off = 0.0 if r.taps is None else (r.taps.height or 0.0) / r.radius + r.taps.missing
-    is_ok = r.status == OK and off <= TAPS_OFF
-    is_certain = r.mean_height_std <= options.largest_std if options.largest_std else is_ok
-    return is_certain and _explains(explored, options)
+    return r.status == OK and off <= TAPS_OFF
 
 
 def _explains(explored: Exploration, options: ExplorationOptions) -> bool:

@@ -4,7 +4,6 @@
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from functools import cache, partial
 from typing import NamedTuple, Protocol, runtime_checkable
 
@@ -60,7 +59,7 @@ def with_facets(r: Reconstruction, surface: object) -> Reconstruction:
     radius. A facet whose edges are all sharp or those of fillets, as that of a cube, is the shape itself.
     """
     shape = _shape_curvatures(r, surface) if isinstance(surface, FacetedSurface) else None
-    return replace(r, shape_curvatures=np.array(shape)) if shape else r
+    return r.judged_with(shape_curvatures=np.array(shape)) if shape else r
 
 
 def _shape_curvatures(r: Reconstruction, mesh: FacetedSurface) -> list[Array]:

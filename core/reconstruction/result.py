@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from statistics import median
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -364,6 +365,12 @@ class Reconstruction(Judged):
             known_height_std=None,
             known_curves=None,
         )
+
+    def judged_with(self, **values: Any) -> "Reconstruction":
+        """The same fit with other `taps` or `shape_curvatures`: what follows from the fit alone is kept."""
+        other, of_these = object.__new__(Reconstruction), ("gravest", "doubts", "curvature_covariance")
+        set_fields(other, **{key: value for key, value in vars(self).items() if key not in of_these} | values)
+        return other
 
     @property
     def message(self) -> str:
