@@ -157,10 +157,12 @@ def _even(of: _Turns) -> Array:
 
     Beyond the ends of a curve its last steps follow in reverse order.
     """
-    from scipy.ndimage import median_filter
-
-    rates, ends = of.turns / np.maximum(of.steps, SMALLEST), np.bincount(of.curve).cumsum()[:-1]
-    return np.concatenate([median_filter(own, STEPS_AROUND, mode="mirror") for own in np.split(rates, ends)])
+    first = of.curve.searchsorted(of.curve)[:, None]
+    last = np.bincount(of.curve)[of.curve][:, None] - 1
+    around = np.arange(len(first))[:, None] - first + np.arange(STEPS_AROUND) - STEPS_AROUND // 2
+    around = last - np.abs(around % np.maximum(2 * last, 1) - last)
+    rates = of.turns / np.maximum(of.steps, SMALLEST)
+    return np.sort(rates[first + around], axis=1)[:, STEPS_AROUND // 2]
 
 
 def _unexplained(of: _Turns, beyond: Array) -> Array:
