@@ -248,8 +248,8 @@ def stops_at(contours: Iterable[Contour], point: ArrayLike, reach: float = 0.0) 
     return [
         stop
         for contour in contours
-        for end, stop in zip(contour.points[[0, -1]], contour.stops or (), strict=False)
-        if stop in SURFACE_STOPS and np.linalg.norm(end - point) <= reach
+        for end, stop in zip((0, -1), contour.stops or (), strict=False)
+        if stop in SURFACE_STOPS and math.dist(contour.points[end], point) <= reach
     ]
 
 
