@@ -71,12 +71,12 @@ def tracker(
         cast, up_in_plane = section(surface, start, t, u, side), complex(dot(up, t), dot(up, u))
         # The curve's normal, turned clockwise by a quarter, is its tangent.
         halves = [_Half(contacts(cast, up_in_plane, turn, n, step, least_cosine)) for turn in (1j, -1j)]
-        curves.append(_Curve(across, halves, p[None], np.array([up])))
+        curves.append(_Curve(Contour(p[None], np.array(across), np.array([up]), noise), across, halves))
 
     def contours(extent: float) -> list[Contour]:
         """The contours to this extent, a length. Raises ValueError if it is not a length of several steps."""
         count = _half_count(extent, step)
-        return [_extended(curve, count, noise, generator) for curve in curves]
+        return [_extended(curve, count, generator) for curve in curves]
 
     return contours
 
@@ -101,28 +101,28 @@ class _Half:
 
 @dataclass(eq=False)
 class _Curve:
-    """The part of a contour that was followed, and the normal of its plane; points and normals are (n, 3)."""
+    """The part of a contour that was followed, the normal of its plane, and what goes on from its ends."""
 
+    contour: Contour
     across: Vector
     halves: list[_Half]
-    points: Array
-    normals: Array
 
 
-def _extended(curve: _Curve, count: int, noise: float, generator: np.random.Generator) -> Contour:
+def _extended(curve: _Curve, count: int, generator: np.random.Generator) -> Contour:
     """The contour of `count` contacts on either side; contacts keep the noise that they have."""
     back, ahead = (_next_contacts(half, count) for half in curve.halves)
     if back or ahead:
+        of, behind = curve.contour, len(back)
         points, normals = np.array([*back[::-1], *ahead]).transpose(1, 0, 2)
-        if noise:
+        if of.noise:
             # The point has none.
-            offsets = np.delete(generator.normal(0.0, noise, len(points) + 1), len(back))
+            offsets = np.delete(generator.normal(0.0, of.noise, len(points) + 1), behind)
             points = points + offsets[:, None] * _curve_normals(normals, curve.across)
-        behind = len(back)
-        curve.points = np.concatenate([points[:behind], curve.points, points[behind:]])
-        curve.normals = np.concatenate([normals[:behind], curve.normals, normals[behind:]])
-    stops = curve.halves[0].stop, curve.halves[1].stop
-    return Contour(curve.points, np.array(curve.across), curve.normals, noise, stops)
+        curve.contour = of.with_valid(
+            points=np.concatenate([points[:behind], of.points, points[behind:]]),
+            normals=np.concatenate([normals[:behind], of.normals, normals[behind:]]),
+        )
+    return curve.contour.with_valid(stops=(curve.halves[0].stop, curve.halves[1].stop))
 
 
 def _next_contacts(half: _Half, count: int) -> list[tuple[Vector, Vector]]:

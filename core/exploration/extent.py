@@ -300,7 +300,7 @@ def _explains(explored: Exploration, options: ExplorationOptions) -> bool:
 
 def _side_counts(contour: Contour, point: Array) -> tuple[int, int]:
     """The numbers of contacts on either side of a point, which is one of them."""
-    at = int(np.argmax((contour.points == point).all(axis=1)))
+    at = contour.points.tolist().index(point.tolist())
     return at, len(contour.points) - 1 - at
 
 
