@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Positive definite systems of a hundred unknowns by scipy's LAPACK, which is faster than numpy for one.
+"""Systems of up to a hundred unknowns by scipy's LAPACK, which is faster than numpy for one.
 
 The numpy and scipy of PyPI each have their own OpenBLAS with its own threads. If they are called by turns,
 these wait for each other's processors, and a touch takes twice as long, or ten times on a busy machine
-(benchmarks.threads, e20b52a). So everything here runs on one thread.
+(benchmarks.threads, e20b52a). So everything here runs on one thread, and a touch never calls numpy's `solve`
+and `inv`, which wake threads even for three unknowns.
 """
 
 from collections.abc import Callable
@@ -97,6 +98,14 @@ def solved_definite(matrix: Array, right: Array) -> Array:
     if failed:
         raise np.linalg.LinAlgError("the matrix is not positive definite")
     return solution
+
+
+@on_one_thread
+def solved_square(matrix: Array, right: Array) -> Array:
+    """matrix^-1 @ right, for an invertible matrix (m, m) and right (m, n)."""
+    from scipy.linalg.lapack import dgesv
+
+    return dgesv(matrix, right)[2]
 
 
 @on_one_thread

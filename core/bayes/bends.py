@@ -18,6 +18,7 @@ from ..arguments import SMALLEST, Array
 from ..contours.contour import Contour
 from ..contours.curves import RIDGE
 from ..contours.local_geometry import Frame
+from ..lapack import solved_square
 from ..verdict import SIGNIFICANT
 
 # M bends, or LEAST_BENDS if there are fewer, show a curvature to the share (FEW_BENDS / M)^3. Fewer than
@@ -51,7 +52,7 @@ class Bends(NamedTuple):
         """The covariance (3, 3) of the coefficients of x^2, xy and y^2, in unit radius, from few bends."""
         second = self.second
         # Outliers may leave two curves.
-        inverse = np.linalg.solve(second @ second.T + RIDGE * np.eye(3), second)
+        inverse = solved_square(second @ second.T + RIDGE * np.eye(3), second)
         covariance: Array = (inverse * self.stds**2) @ inverse.T
         return covariance
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array
-from ..lapack import solved
+from ..lapack import solved, solved_square
 from ..patch.differential_geometry import Derivatives
 from ..patch.monge import (
     DEGREE,
@@ -255,7 +255,7 @@ class SurfacePosterior(HeightField):
             return False
         apart = _UNLIKE_SPHERE @ self.polynomial
         apart_covariance = _UNLIKE_SPHERE @ self.covariance @ _UNLIKE_SPHERE.T
-        return float(apart @ np.linalg.solve(apart_covariance, apart)) <= ROUND
+        return float(apart @ solved_square(apart_covariance, apart)) <= ROUND
 
     def curvature_std(self) -> float:
         """Standard deviation of the normal curvature at the origin, in the direction where it is largest."""
