@@ -138,13 +138,13 @@ def process_neg2_log_evidence(rows: Array, kernels: list[Array], prior: Array, n
         for side in (range(size // 2, size), range(size // 2 - 1, -1, -1)):
             before = row[side.start - side.step, MIDDLE]
             for j in side:
-                row[j, MIDDLE] = now = at(i, AMPLITUDES[j], noises[MIDDLE])
+                row[j, MIDDLE] = now = at(i, float(AMPLITUDES[j]), float(noises[MIDDLE]))
                 if now > max(before, neg2_logs.min() + NEGLIGIBLE):
                     break
                 before = now
     for i, j in np.argwhere(neg2_logs[..., MIDDLE] < neg2_logs.min() + NEGLIGIBLE).tolist():
         for k in {*range(PROCESS_NOISES)} - {MIDDLE}:
-            neg2_logs[i, j, k] = at(i, AMPLITUDES[j], noises[k])
+            neg2_logs[i, j, k] = at(i, float(AMPLITUDES[j]), float(noises[k]))
     return neg2_logs
 
 

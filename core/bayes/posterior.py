@@ -118,7 +118,7 @@ class SurfacePosterior(HeightField):
         z: Array = monomials(at, TERMS) @ self.mean
         if len(self.places):
             z += weighted_kernel(at, self.places, self.variances, self.alpha)
-        return z.reshape(np.broadcast_shapes(np.shape(x), np.shape(y)))
+        return z.reshape(np.broadcast(x, y).shape)
 
     def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
         """Height, slopes and second derivatives of the mean at (x, y)."""
@@ -368,7 +368,9 @@ def nearest_quartic(mean: Array, alpha: Array, places: Array, variances: Array) 
 
 def _rows(x: ArrayLike, y: ArrayLike) -> Array:
     """Points (n, 2) of raveled x and y."""
-    return np.array(np.broadcast_arrays(x, y), dtype=float).reshape(2, -1).T
+    points = np.empty((*np.broadcast(x, y).shape, 2))
+    points[..., 0], points[..., 1] = x, y
+    return points.reshape(-1, 2)
 
 
 @cache

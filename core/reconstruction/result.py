@@ -264,7 +264,7 @@ class Reconstruction(Judged):
         fitted = float(self.posterior.noise)
         noises = [fitted if c.noise is None else c.noise / self.radius for c in self.contours]
         contours, most = self.contours, SIGNIFICANT * max(fitted, MISFIT) * self.radius
-        if self._departures.max() > most:
+        if np.abs(self._residuals).max() > most:
             contours = tuple(self._explained(c, most) if c.normals is None else c for c in contours)
         noise, terms = max(noises, default=0.0), self.posterior.polynomial[2:FREE]
         return bends_of(contours, self.frame, self.radius, noise, terms)
@@ -308,20 +308,20 @@ class Reconstruction(Judged):
         return self.null_space_dimension / terms_to(self.patch.degree)
 
     @cached_property
-    def _departures(self) -> Array:
-        """|dz| of the contacts, (n,)."""
+    def _residuals(self) -> Array:
+        """The heights of the surface above the contacts, (n,)."""
         x, y, z = self.contacts.T
-        return np.abs(self.height(x, y) - z)
+        return self.height(x, y) - z
 
     @property
     def fit_error(self) -> float:
         """The mean of |dz| over the contacts (6), a length."""
-        return float(self._departures.mean())
+        return float(np.abs(self._residuals).mean())
 
     @property
     def typical_miss(self) -> float:
         """The median of |dz| over the contacts, which outliers do not change."""
-        return median(self._departures.tolist())
+        return median(np.abs(self._residuals).tolist())
 
     @cached_property
     def waves(self) -> float:
@@ -332,7 +332,7 @@ class Reconstruction(Judged):
         if not self.posterior.amplitude:
             return 0.0
         basis = monomials(self.contacts / self.radius, exponents(1, 4))
-        height = self.height(*self.contacts[:, :2].T)
+        height = self.contacts[:, 2] + self._residuals
         off = height - basis @ np.linalg.lstsq(basis, height, rcond=None)[0]
         return math.sqrt(float(np.mean(off**2)))
 
