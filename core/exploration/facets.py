@@ -3,7 +3,7 @@
 """The curvatures of the shape that the facets of a mesh stand for, where a touch has felt few of them."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache, partial
 from typing import NamedTuple, Protocol, runtime_checkable
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import SMALLEST, Array
+from ..contours.contour import cross
 from ..patch.differential_geometry import Derivatives
 from ..reconstruction.result import Reconstruction
 
@@ -33,7 +34,7 @@ NEIGHBOR_STEP = 0.05  # The neighbor across an edge is the facet at this share o
 class FacetedSurface(Protocol):
     """A surface that consists of flat faces."""
 
-    def face_near(self, point: Array) -> int:
+    def face_near(self, point: Sequence[float] | Array) -> int:
         """The number of the face nearest to a point (3,) of the world."""
 
     def corners_of(self, number: int) -> ArrayLike:
@@ -48,7 +49,7 @@ class Facet(NamedTuple):
 
     def width(self, edge: Array) -> float:
         """The width of the face across the direction of an edge (3,), a length; 0 for an edge without one."""
-        across, length = np.cross(edge, self.normal), float(np.linalg.norm(edge))
+        across, length = cross(edge, self.normal), float(np.linalg.norm(edge))
         return float(np.ptp(self.corners @ across)) / length if length else 0.0
 
 
@@ -69,8 +70,8 @@ def _shape_curvatures(r: Reconstruction, mesh: FacetedSurface) -> list[Array]:
         return []
     facet, around = cache(lambda face: _facet(mesh, face)), partial(_around, r, mesh, width)
     points = around(TURNING)
-    by_turning = _turning(r, points, [facet(mesh.face_near(point)) for point in points])
-    faces_within = [set(map(mesh.face_near, around(share))) for share in CORNERS]
+    by_turning = _turning(r, points, [facet(face) for face in map(mesh.face_near, points.tolist())])
+    faces_within = [set(map(mesh.face_near, around(share).tolist())) for share in CORNERS]
     by_corners = [_of_corners(r, map(facet, faces)) for faces in faces_within]
     return [by_turning, *(estimate for estimate in by_corners if estimate is not None)]
 
@@ -143,7 +144,7 @@ def _bends(point: Array, mesh: FacetedSurface) -> Iterator[tuple[float, float]]:
     """The widths of the facet at a point and of its neighbor across each edge that turns as a smooth bend."""
     facet = _facet(mesh, mesh.face_near(point))
     starts, along = facet.corners, np.roll(facet.corners, -1, axis=0) - facet.corners
-    outward = np.cross(along, facet.normal)
+    outward = np.array(cross(along.T, facet.normal)).T
     for start, edge, out in zip(starts, along, outward, strict=True):
         if not np.any(out):
             continue
@@ -157,5 +158,5 @@ def _bends(point: Array, mesh: FacetedSurface) -> Iterator[tuple[float, float]]:
 def _facet(mesh: FacetedSurface, number: int) -> Facet:
     """The face of this number; its normal is 0 if it has no area."""
     points = np.asarray(mesh.corners_of(number), dtype=float)
-    across = np.cross(points[1:-1] - points[0], points[2:] - points[0]).sum(axis=0)
+    across = np.sum(cross((points[1:-1] - points[0]).T, (points[2:] - points[0]).T), axis=1)
     return Facet(points, across / (float(np.linalg.norm(across)) or 1.0))
