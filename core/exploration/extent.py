@@ -7,9 +7,9 @@ So touches of one surface can go side by side, and their fits be done in stacks.
 """
 
 import math
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -113,7 +113,7 @@ class Touch:
                 shape = explored.result.shape_curvatures
                 explored = replace(explored, result=r.judged_with(shape_curvatures=shape))
         else:
-            explored = yield from self._felt(extent / CONTACTS, CONTACTS)
+            explored = yield from self._felt(extent, self._denser(extent / CONTACTS, CONTACTS))
         explored = self._with_taps(explored)
         stds = [explored.result.mean_height_std]
         while (
@@ -141,12 +141,13 @@ class Touch:
         tried: list[Exploration] = []
         rough: dict[tuple[float, int], float] = {}
         for rung in self._rungs():
-            roughness = self._roughness(rung)
-            if roughness > ROUGH:
-                rough[rung] = roughness / math.prod(rung)
+            denser, extent = self._denser(*rung), math.prod(rung)
+            first = next(denser)
+            if (roughness := self._roughness(first[0])) > ROUGH:
+                rough[rung] = roughness / extent
                 continue
             try:
-                explored = yield from self._felt(*rung)
+                explored = yield from self._felt(extent, chain([first], denser))
             except DegenerateCurvesError:
                 continue
             if _is_sure(explored.result, self.options) and _explains(explored, self.options):
@@ -158,8 +159,9 @@ class Touch:
                 break
         if rough or not tried:
             longest = self.farthest / MOST_CONTACTS, MOST_CONTACTS
+            rung = min(rough, key=rough.__getitem__, default=longest)
             try:
-                tried.append((yield from self._felt(*min(rough, key=rough.__getitem__, default=longest))))
+                tried.append((yield from self._felt(math.prod(rung), self._denser(*rung))))
             except DegenerateCurvesError:
                 if not tried:
                     raise
@@ -177,9 +179,8 @@ class Touch:
         judged = [replace(e, result=e.result.judged_with(shape_curvatures=shape)) for e in tried]
         return min(judged, key=lambda e: (e.result.status != OK, max(e.result.k1_std, e.result.k2_std)))
 
-    def _roughness(self, rung: tuple[float, int]) -> float:
-        """How rough contacts of this step and number are; infinite if a half curve ends at the point."""
-        contours, _ = next(self._denser(*rung))
+    def _roughness(self, contours: list[Contour]) -> float:
+        """How rough the contacts of contours are; infinite if a half curve ends at the point."""
         if stops_at(contours, self.point):
             return math.inf
         points = np.vstack([contour.points for contour in contours])
@@ -199,15 +200,15 @@ class Touch:
             counts = (MOST_CONTACTS * shares * finest / step + 1e-6).astype(int).tolist()
             yield from ((step, count) for count, shorter in pairwise(counts) if min(longest, count) > shorter)
 
-    def _felt(self, step: float, count: int) -> Steps:
+    def _felt(self, extent: float, denser: Iterable[tuple[list[Contour], float]]) -> Steps:
         """The touch with half curves of this length, and the first number of contacts that suffices."""
-        for contours, between in self._denser(step, count):  # noqa: B007
+        for contours, between in denser:  # noqa: B007
             r = yield Request(contours, self.options.extent is None)
             if isinstance(r, Reconstruction) and suffices(r):
                 break
         if isinstance(r, DegenerateCurvesError):
             raise r
-        return Exploration(contours, r, step * count, between, tuple(self.options.planes))
+        return Exploration(contours, r, extent, between, tuple(self.options.planes))
 
     def _denser(self, step: float, count: int) -> Iterator[tuple[list[Contour], float]]:
         """Contours of half curves of `count` contacts, and then of more in the same length; and their steps.
