@@ -65,13 +65,13 @@ def tracker(
     noise, generator = number("noise", noise, least=0.0), generator_of(rng)
     e1 = tangent_of(n, tangent)
     start, up, side = first_contact(checked(surface), vector_of(p), n, e1, step)
-    curves = []
+    first, curves = Contour(p[None], None, np.array([up]), noise), []
     for plane in planes:
         t, u, across = plane.axes_of_unit_vectors(n, e1)
         cast, up_in_plane = section(surface, start, t, u, side), complex(dot(up, t), dot(up, u))
         # The curve's normal, turned clockwise by a quarter, is its tangent.
         halves = [_Half(contacts(cast, up_in_plane, turn, n, step, least_cosine)) for turn in (1j, -1j)]
-        curves.append(_Curve(Contour(p[None], np.array(across), np.array([up]), noise), across, halves))
+        curves.append(_Curve(first.with_valid(plane_normal=np.array(across)), across, halves))
 
     def contours(extent: float) -> list[Contour]:
         """The contours to this extent, a length. Raises ValueError if it is not a length of several steps."""
