@@ -55,7 +55,7 @@ def tracker(
     tangent: ArrayLike | None = None,
     least_cosine: float = -1.0,
 ) -> Callable[[float], list[Contour]]:
-    """`track` as a function of the extent, which continues its contours at a longer one.
+    """`track` as a function of the extent, which continues the contours that it has.
 
     least_cosine : a contour ends where the normals of two contacts turn by more than this cosine's angle
     """
@@ -109,7 +109,7 @@ class _Curve:
 
 
 def _extended(curve: _Curve, count: int, generator: np.random.Generator) -> Contour:
-    """The contour of `count` contacts on either side; contacts keep the noise that they have."""
+    """The contour of up to `count` contacts on either side; contacts keep the noise that they have."""
     back, ahead = (_next_contacts(half, count) for half in curve.halves)
     if back or ahead:
         of, behind = curve.contour, len(back)
@@ -122,7 +122,9 @@ def _extended(curve: _Curve, count: int, generator: np.random.Generator) -> Cont
             points=np.concatenate([points[:behind], of.points, points[behind:]]),
             normals=np.concatenate([normals[:behind], of.normals, normals[behind:]]),
         )
-    return curve.contour.with_valid(stops=(curve.halves[0].stop, curve.halves[1].stop))
+    at, (before, after) = curve.halves[0].count, (min(half.count, count) for half in curve.halves)
+    stops = [EXTENT if half.count > count else half.stop for half in curve.halves]
+    return curve.contour.part(slice(at - before, at + after + 1), (stops[0], stops[1]))
 
 
 def _next_contacts(half: _Half, count: int) -> list[tuple[Vector, Vector]]:

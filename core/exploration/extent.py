@@ -89,8 +89,7 @@ class Touch:
     point : (3,)
     reference : columns e1, n and e1 x n, from which azimuths are measured
     farthest : a length that no half curve exceeds
-    followed : by step, the function that tracks the contours of the options' planes, the longest extent so
-        far, and the contours to this extent
+    followed : by step, what follows the contours of the options' planes to a given extent
     tapped : contacts of taps, (n, 3) each
     """
 
@@ -100,7 +99,7 @@ class Touch:
     reference: Array
     farthest: float
     options: ExplorationOptions
-    followed: dict[float, tuple[Follow, float, list[Contour]]] = field(default_factory=dict)
+    followed: dict[float, Follow] = field(default_factory=dict)
     tapped: list[Array] = field(default_factory=lambda: [np.empty((0, 3))])
 
     def steps(self) -> Steps:
@@ -233,26 +232,22 @@ class Touch:
         return replace(explored, result=with_facets(r.judged_with(taps=taps), self.surface))
 
     def _followed(self, step: float, extent: float) -> list[Contour]:
-        """The contours of the planes with contacts this step apart, at least to an extent."""
+        """The contours of the planes with contacts this step apart, to an extent."""
         if step not in self.followed:
-            self.followed[step] = self.follow(self.options.planes, step=step), 0.0, []
-        follow, longest, contours = self.followed[step]
-        if extent > longest:
-            self.followed[step] = follow, extent, (contours := follow(extent))
-        return contours
+            self.followed[step] = self.follow(self.options.planes, step=step)
+        return self.followed[step](extent)
 
     def _cut(self, step: float, count: int) -> list[Contour]:
         """The contours of the planes with half curves of `count` contacts this step apart."""
         contours = self._followed(step, step * count)
-        if count >= int(self.farthest / step * (1.0 + 1e-6)):
-            return contours
-        return [_shortened(contour, self.point, count) for contour in contours]
+        is_farthest = count >= int(self.farthest / step * (1.0 + 1e-6))
+        return contours if is_farthest else list(map(_ended, contours))
 
     def _with_plane(self, explored: Exploration, plane: SamplingPlane) -> Steps:
         """The touch with one plane more. Raises ValueError if nothing can be felt along it."""
         (more,) = self.follow((plane,), step=explored.step)(explored.extent)
         if explored.extent < self.farthest:
-            more = _shortened(more, self.point, len(more.points))
+            more = _ended(more)
         contours, planes = [*explored.contours, more], (*explored.planes, plane)
         r = yield from _fitted(contours)
         return self._with_taps(replace(explored, contours=contours, result=r, planes=planes))
@@ -305,11 +300,7 @@ def _side_counts(contour: Contour, point: Array) -> tuple[int, int]:
     return at, len(contour.points) - 1 - at
 
 
-def _shortened(contour: Contour, point: Array, count: int) -> Contour:
-    """The contour of at most `count` contacts on either side of a point, with the stops of such a one."""
-    before, after = _side_counts(contour, point)
-    stops = [
-        UNEXPLAINED if n > count or stop == EXTENT else stop
-        for n, stop in zip((before, after), contour.stops or (), strict=True)
-    ]
-    return contour.part(slice(max(before - count, 0), before + count + 1), (stops[0], stops[1]))
+def _ended(contour: Contour) -> Contour:
+    """The contour of a touch that ends half curves itself, where the surface does not."""
+    stops = (UNEXPLAINED if stop == EXTENT else stop for stop in contour.stops or ())
+    return contour.with_valid(stops=tuple(stops))
