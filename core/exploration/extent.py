@@ -274,15 +274,15 @@ def suffices(r: Reconstruction) -> bool:
 def _are_shorter_worse(r: Reconstruction) -> bool:
     """Whether a patch is in doubt for a reason that shorter half curves make worse: noise, or few facets."""
     is_noisy = r.mean_height_std > DOUBTFUL_STD * r.radius and not suffices(r)
-    return is_noisy or (r.gravest is not None and r.gravest.code == "facets" and len(r.doubts) == 1)
+    return is_noisy or (len(r.shape_curvatures) > 0 and [doubt.code for doubt in r.doubts] == ["facets"])
 
 
 def _is_sure(r: Reconstruction, options: ExplorationOptions) -> bool:
     """Whether a patch is as certain as the options require, and taps show the surface there."""
-    if options.largest_std:
-        return r.mean_height_std <= options.largest_std
     off = 0.0 if r.taps is None else (r.taps.height or 0.0) / r.radius + r.taps.missing
-    return r.status == OK and off <= TAPS_OFF
+    # Of all doubts, the deviation of the height is the one that is known already.
+    is_certain = r.mean_height_std <= (options.largest_std or DOUBTFUL_STD * r.radius)
+    return is_certain and (options.largest_std is not None or (r.status == OK and off <= TAPS_OFF))
 
 
 def _explains(explored: Exploration, options: ExplorationOptions) -> bool:
@@ -290,7 +290,9 @@ def _explains(explored: Exploration, options: ExplorationOptions) -> bool:
     r = explored.result
     x, y, z = r.frame.to_local(np.concatenate([contour.points for contour in explored.contours])).T
     off, noise = z - r.height(x, y), max(options.noise, float(r.posterior.noise) * r.radius)
-    far = too_far(off, np.hypot(r.height_std(x, y), noise)) & (np.abs(off) > (options.largest_std or 0.0))
+    far = too_far(off, noise) & (np.abs(off) > (options.largest_std or 0.0))
+    if far.any():  # Noise alone explains most contacts.
+        far[far] = too_far(off[far], np.hypot(r.height_std(x[far], y[far]), noise))
     return are_few(far, np.append(far[1:], False))
 
 
