@@ -24,7 +24,6 @@ from ..contours.contour import SURFACE_ENDS, Contour, read_only, stops_at
 from ..contours.curves import (
     Curves,
     curves_through,
-    distances_from_point,
     misses,
     stacked,
 )
@@ -115,14 +114,14 @@ class Reconstruction(Judged):
     @cached_property
     def contacts(self) -> Array:
         """The fitted contacts without the reference point, (n, 3), in the frame."""
-        curves = zip(self.contours, self._off_point, strict=True)
-        points = np.concatenate([*(contour.points[off] for contour, off in curves), self.strokes])
-        return self.frame.to_local(points)
+        origin, curves = self.frame.origin, self._curves
+        points = curves.points[curves.present] + (self._meeting - origin)
+        return np.concatenate([points, self.strokes - origin]) @ self.frame.axes
 
     @cached_property
-    def _off_point(self) -> list[NDArray[np.bool_]]:
-        """Which contacts of each contour are not the reference point."""
-        return [distances_from_point(contour.points - self._meeting)[1] for contour in self.contours]
+    def _curves(self) -> Curves:
+        """The contours as seen from where they meet, in the world."""
+        return self.known_curves or curves_through(*stacked(self._meeting[None], [self.contours]))
 
     @property
     def _meeting(self) -> Array:
@@ -132,8 +131,7 @@ class Reconstruction(Judged):
     @cached_property
     def misses(self) -> Array:
         """Distance at which each of the c curves passes the reference point, and its deviation, (c, 2)."""
-        curves = self.known_curves or curves_through(*stacked(self._meeting[None], [self.contours]))
-        return misses(curves)[0, : len(self.contours)]
+        return misses(self._curves)[0, : len(self.contours)]
 
     @cached_property
     def posterior(self) -> SurfacePosterior:
@@ -431,7 +429,7 @@ class Reconstruction(Judged):
         """The number of deviations, and the share of L, by which a curve is off what the others show."""
         if self.method != "bayes" or len(self.contours) + (len(self.strokes) > 0) < LEAST_CURVES:
             return 0.0, 0.0
-        sizes = [int(np.count_nonzero(counted)) for counted in self._off_point]
+        sizes = self._curves.present[0].sum(axis=1)
         curve = np.repeat([*range(len(sizes)), -1], [*sizes, len(self.strokes)])
         return contradicting_curve(
             self.contacts / self.radius, curve, self.posterior, self.noise, self.point_std
