@@ -177,6 +177,12 @@ class SurfacePosterior(HeightField):
         return places_factor(kernel(self.places, self.places, self.variances))
 
     @cached_property
+    def _projected_within(self) -> Array:
+        """Covariances (m, 27) of g at the places with the coefficients that the projection makes of it."""
+        at, weights = _projection()
+        return kernel(self.places, at, self.variances) @ weights.T
+
+    @cached_property
     def polynomial(self) -> Array:
         """The coefficients (27,) of the polynomial that describes the mean of z in its Darboux frame.
 
@@ -188,9 +194,7 @@ class SurfacePosterior(HeightField):
             return self.sextic.mean
         if not len(self.places):
             return self.mean
-        at, weights = _projection()
-        quartic: Array = _projected_terms() @ self.mean
-        quartic += weights @ weighted_kernel(at, self.places, self.variances, self.alpha)
+        quartic: Array = _projected_terms() @ self.mean + self.alpha @ self._projected_within
         mean, half = quartic[2] + quartic[4], math.hypot(quartic[2] - quartic[4], quartic[3])
         quartic[:FREE] = 0.0, 0.0, 0.5 * (mean - half), 0.0, 0.5 * (mean + half)
         return quartic
@@ -203,9 +207,8 @@ class SurfacePosterior(HeightField):
         if not len(self.places):
             root = self.root[:, :-1]
             return root.T @ root
-        at, weights = _projection()
-        within = kernel(self.places, at, self.variances) @ weights.T
-        known, left = self._whitened_sums(_projected_terms().T, weights.sum(axis=1), within)
+        ones = _projection()[1].sum(axis=1)
+        known, left = self._whitened_sums(_projected_terms().T, ones, self._projected_within)
         own = sum(map(np.multiply, self.variances, _projected_kernels(tuple(process.LENGTHS))))
         return own + left.T @ left - known.T @ known
 
