@@ -158,12 +158,11 @@ def _even(of: _Turns) -> Array:
 
     Beyond the ends of a curve its last steps follow in reverse order.
     """
-    first = of.curve.searchsorted(of.curve)[:, None]
-    last = np.bincount(of.curve)[of.curve][:, None] - 1
-    around = np.arange(len(first))[:, None] - first + np.arange(STEPS_AROUND) - STEPS_AROUND // 2
-    around = last - np.abs(around % np.maximum(2 * last, 1) - last)
-    rates = of.turns / np.maximum(of.steps, SMALLEST)
-    return np.sort(rates[first + around], axis=1)[:, STEPS_AROUND // 2]
+    rates, half = of.turns / np.maximum(of.steps, SMALLEST), STEPS_AROUND // 2
+    start, last = of.curve.searchsorted(of.curve)[:, None], np.bincount(of.curve)[of.curve][:, None] - 1
+    around = np.arange(len(rates))[:, None] - start + np.arange(-half, half + 1)
+    mirrored = last - np.abs(around % np.maximum(2 * last, 1) - last)
+    return np.sort(rates[start + mirrored], axis=1)[:, half]
 
 
 def _unexplained(of: _Turns, beyond: Array) -> Array:

@@ -31,8 +31,7 @@ def curvature_contradiction(contacts: Array, posterior: SurfacePosterior, covari
         return 0.0
     basis = monomials(near, TERMS)[:, : terms_to(4)]
     gram = basis.T @ basis
-    identity = np.eye(len(gram))
-    inverse = solved_square(gram + INVISIBLE * gram.trace() * identity, identity)
+    inverse = solved_square(gram + INVISIBLE * gram.trace() * np.eye(len(gram)), np.eye(len(gram)))
     rank = float((inverse * gram).sum())
     if len(near) < CONTACTS_PER_RANK * rank:
         return 0.0

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from statistics import median
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -364,7 +363,7 @@ class Reconstruction(Judged):
             known_curves=None,
         )
 
-    def judged_with(self, **values: Any) -> "Reconstruction":
+    def judged_with(self, **values: object) -> "Reconstruction":
         """The same fit with other `taps` or `shape_curvatures`: what follows from the fit alone is kept."""
         other, of_these = object.__new__(Reconstruction), ("gravest", "doubts", "curvature_covariance")
         set_fields(other, **{key: value for key, value in vars(self).items() if key not in of_these} | values)
