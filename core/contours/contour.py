@@ -243,7 +243,7 @@ def consistently_oriented(normals: Array, order: NDArray[np.intp], starts: NDArr
     return np.where(side[:, None] < 0.0, -unit, unit)
 
 
-def stops_at(contours: Iterable[Contour], point: Array, reach: float = 0.0) -> list[str]:
+def stops_at(contours: Iterable[Contour], point: Sequence[float] | Array, reach: float = 0.0) -> list[str]:
     """Why half curves end within the length `reach` of a point (3,) already: it is at a crease or an edge."""
     return [
         stop
