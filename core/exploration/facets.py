@@ -49,7 +49,7 @@ class Facet(NamedTuple):
 
     def width(self, edge: Array) -> float:
         """The width of the face across the direction of an edge (3,), a length; 0 for an edge without one."""
-        across, length = cross(edge, self.normal), float(np.linalg.norm(edge))
+        across, length = cross(edge, self.normal), math.hypot(*edge)
         return float(np.ptp(self.corners @ across)) / length if length else 0.0
 
 
@@ -146,10 +146,10 @@ def _bends(point: Array, mesh: FacetedSurface) -> Iterator[tuple[float, float]]:
     starts, along = facet.corners, np.roll(facet.corners, -1, axis=0) - facet.corners
     outward = np.array(cross(along.T, facet.normal)).T
     for start, edge, out in zip(starts, along, outward, strict=True):
-        if not np.any(out):
+        if not out.any():
             continue
         width = facet.width(edge)
-        beyond = start + 0.5 * edge + NEIGHBOR_STEP * width * out / np.linalg.norm(out)
+        beyond = start + 0.5 * edge + NEIGHBOR_STEP * width * out / math.hypot(*out)
         neighbor = _facet(mesh, mesh.face_near(beyond))
         if math.cos(SMOOTH) < float(facet.normal @ neighbor.normal) < math.cos(DISTINCT):
             yield width, neighbor.width(edge)
@@ -159,4 +159,4 @@ def _facet(mesh: FacetedSurface, number: int) -> Facet:
     """The face of this number; its normal is 0 if it has no area."""
     points = np.asarray(mesh.corners_of(number), dtype=float)
     across = np.sum(cross((points[1:-1] - points[0]).T, (points[2:] - points[0]).T), axis=1)
-    return Facet(points, across / (float(np.linalg.norm(across)) or 1.0))
+    return Facet(points, across / (math.hypot(*across) or 1.0))

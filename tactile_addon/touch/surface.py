@@ -127,7 +127,7 @@ class MeshSurface(PlacedMesh):
     def corners_of(self, number: int) -> Array:
         """The corners (k, 3) of a face in the world, in order; counterclockwise, unless it is mirrored."""
         vertices = self._mesh.vertices
-        co = np.array([vertices[i].co for i in self._mesh.polygons[number].vertices], dtype=float)
+        co = np.array([vertices[i].co[:] for i in self._mesh.polygons[number].vertices])
         return co @ self._linear.T + self._origin
 
     def _nearest(self, local: Triple) -> Any:
