@@ -57,7 +57,6 @@ class Reconstruction(Judged):
     taps : what taps between the curves have met; None without taps
     shape_curvatures : (n, 2), estimates of the principal curvatures, in order, of the shape that few facets
         stand for; none where the mesh is fine or unknown
-    known_height_std : mean_height_std, if it was computed before
     known_curves : the contours as Curves of one touch, in the world, if they were computed before
 
     All else is computed from these when it is first used, so contours and strokes are copies that cannot be
@@ -75,7 +74,6 @@ class Reconstruction(Judged):
     strokes: Array = field(default_factory=lambda: np.empty((0, 3)))
     taps: Taps | None = None
     shape_curvatures: Array = field(default_factory=lambda: np.empty((0, 2)))
-    known_height_std: float | None = None
     known_curves: Curves | None = None
 
     def __post_init__(self) -> None:
@@ -181,8 +179,7 @@ class Reconstruction(Judged):
     @cached_property
     def mean_height_std(self) -> float:
         """The mean of height_std over the domain."""
-        known = self.known_height_std
-        return float(self.domain.nodes[1] @ self.node_stds) if known is None else known
+        return float(self.domain.nodes[1] @ self.node_stds)
 
     @cached_property
     def node_stds(self) -> Array:
@@ -359,12 +356,14 @@ class Reconstruction(Judged):
             strokes=end + scale * (self.strokes - start) @ turn.T,
             point=end,
             shape_curvatures=self.shape_curvatures / scale,
-            known_height_std=None,
             known_curves=None,
         )
 
     def judged_with(self, **values: object) -> "Reconstruction":
-        """The same fit with other `taps` or `shape_curvatures`: what follows from the fit alone is kept."""
+        """The same fit with other values that only its verdict depends on: `taps`, `shape_curvatures`.
+
+        What follows from the fit alone is kept; `mean_height_std` may be given if it is known.
+        """
         other, of_these = object.__new__(Reconstruction), ("gravest", "doubts", "curvature_covariance")
         set_fields(other, **{key: value for key, value in vars(self).items() if key not in of_these} | values)
         return other
