@@ -4,7 +4,7 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from functools import cache, partial
+from functools import cache
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -68,10 +68,9 @@ def _shape_curvatures(r: Reconstruction, mesh: FacetedSurface) -> list[Array]:
     width = _smooth_width(r.frame.origin, mesh)
     if width < max(MIN_WIDTH_RATIO * r.radius, SMALLEST):
         return []
-    facet, around = cache(lambda face: _facet(mesh, face)), partial(_around, r, mesh, width)
-    points = around(TURNING)
+    facet, (points, *corners) = cache(lambda face: _facet(mesh, face)), _around(r, mesh, width)
     by_turning = _turning(r, points, [facet(face) for face in map(mesh.face_near, points.tolist())])
-    faces_within = [set(map(mesh.face_near, around(share).tolist())) for share in CORNERS]
+    faces_within = [set(map(mesh.face_near, near.tolist())) for near in corners]
     by_corners = [_of_corners(r, map(facet, faces)) for faces in faces_within]
     return [by_turning, *(estimate for estimate in by_corners if estimate is not None)]
 
@@ -81,11 +80,12 @@ def is_beside_bend(point: Array, mesh: FacetedSurface) -> bool:
     return _smooth_width(point, mesh) > 0.0
 
 
-def _around(r: Reconstruction, mesh: FacetedSurface, width: float, share: float) -> Array:
-    """Points (n, 3) of the world along the curves and these turned around the normal, to a share of widths.
+def _around(r: Reconstruction, mesh: FacetedSurface, width: float) -> list[Array]:
+    """Points (n, 3) of the world along the curves and these turned around the normal.
 
-    Widths are those of the facet at the point in each direction, and at most the given one. Where facets
-    narrow, as near the tip of a cone, the points end where the patch has turned by SMOOTH.
+    They go to TURNING and, in the others, to CORNERS widths of the facet at the point in each direction, all
+    at most the given one. Where facets narrow, as near the tip of a cone, points end where the patch has
+    turned by SMOOTH.
     """
     x, y, z = r.frame.to_local(np.vstack([contour.points for contour in r.contours])).T / r.radius
     turned = [(x * c - y * s, x * s + y * c, z) for c, s in zip(np.cos(TURNS), np.sin(TURNS), strict=True)]
@@ -93,9 +93,8 @@ def _around(r: Reconstruction, mesh: FacetedSurface, width: float, share: float)
     spans = np.ptp(points[:, :2] @ r.frame.to_local(corners)[:, :2].T, axis=1)
     widths = np.minimum(spans / np.maximum(np.hypot(*points[:, :2].T), SMALLEST), width)
     steepness = max(abs(r.k1), abs(r.k2)) / SMOOTH
-    return r.frame.to_world(
-        points / np.maximum(steepness, 1.0 / np.maximum(share * widths, SMALLEST))[:, None]
-    )
+    limits = (np.maximum(share * widths, SMALLEST)[:, None] for share in (TURNING, *CORNERS))
+    return [r.frame.to_world(points / np.maximum(steepness, 1.0 / limit)) for limit in limits]
 
 
 def _turning(r: Reconstruction, points: Array, facets: list[Facet]) -> Array:
