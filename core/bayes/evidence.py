@@ -34,7 +34,7 @@ NEGLIGIBLE = 160.0  # If -2 log likelihood exceeds the best by more, no other no
 # Largest prior variance of slopes and second derivatives in a model with a process: with 100 they run away if
 # curves end early.
 MOST_VARIANCE = 0.06
-# Those of the polynomials that a process competes with, by their waviness.
+# The prior variances of the polynomials that a process competes with, by their waviness.
 SEXTIC_VARIANCES = np.minimum(prior_variances(np.array([0.3, 0.6, 1.2])), MOST_VARIANCE)
 # The power of the likelihood in a model with a process, because neighbors on a curve show no waves between
 # curves.
