@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Positive definite systems of a hundred unknowns by scipy's LAPACK, which is faster than numpy for one.
+"""Systems of up to a hundred unknowns by scipy's LAPACK, which is faster than numpy for one.
 
 The numpy and scipy of PyPI each have their own OpenBLAS with its own threads. If they are called by turns,
 these wait for each other's processors, and a touch takes twice as long, or ten times on a busy machine
-(benchmarks.threads, e20b52a). So everything here runs on one thread.
+(benchmarks.threads, e20b52a). So everything here runs on one thread, and a touch never calls numpy's `solve`
+and `inv`, which wake threads even for three unknowns.
 """
 
 from collections.abc import Callable
@@ -47,14 +48,20 @@ def on_one_thread(run: Callable[P, R]) -> Callable[P, R]:
 
 
 @cache
+def _lapack() -> Any:
+    """scipy's LAPACK, which is imported by the first call, because that takes a tenth of a second."""
+    import scipy.linalg.lapack
+
+    return scipy.linalg.lapack
+
+
+@cache
 def _threads() -> tuple[Any, Any] | None:
     """The functions that get and set the threads of scipy's own OpenBLAS, or None if it has none."""
     import ctypes
     from pathlib import Path
 
-    import scipy.linalg.lapack  # This loads the library, if there is one.
-
-    home = Path(scipy.__file__).parent
+    home = Path(_lapack().__file__).parents[1]  # This loads the library, if there is one.
     for path in (*home.parent.glob("scipy.libs/*openblas*"), *home.glob(".dylibs/*openblas*")):
         library = ctypes.CDLL(str(path))
         # A later scipy may call these otherwise; then fits go on with as many threads as it has.
@@ -67,9 +74,7 @@ def _threads() -> tuple[Any, Any] | None:
 @on_one_thread
 def cholesky(matrix: Array) -> Array:
     """The lower triangular factor of a matrix (m, m), which is used up."""
-    from scipy.linalg.lapack import dpotrf
-
-    factor, failed = dpotrf(matrix.T, lower=0, clean=1, overwrite_a=1)
+    factor, failed = _lapack().dpotrf(matrix.T, lower=0, clean=1, overwrite_a=1)
     if failed:
         raise np.linalg.LinAlgError("the matrix is not positive definite")
     return factor.T
@@ -82,34 +87,32 @@ def cholesky_in_place(matrix: Array) -> Array:
     the factor ends early, which no error reports. Callers limit the threads themselves, with `on_one_thread`,
     because they call it many times.
     """
-    from scipy.linalg.lapack import dpotrf
-
-    dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
+    _lapack().dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
     return matrix.reshape(-1)[:: len(matrix) + 1]
 
 
 @on_one_thread
 def solved_definite(matrix: Array, right: Array) -> Array:
     """matrix^-1 @ right (m,), for a positive definite matrix (m, m), whose lower triangle is used up."""
-    from scipy.linalg.lapack import dposv
-
-    _, solution, failed = dposv(matrix.T, right, lower=0, overwrite_a=1)
+    _, solution, failed = _lapack().dposv(matrix.T, right, lower=0, overwrite_a=1)
     if failed:
         raise np.linalg.LinAlgError("the matrix is not positive definite")
     return solution
 
 
 @on_one_thread
+def solved_square(matrix: Array, right: Array) -> Array:
+    """matrix^-1 @ right, for an invertible matrix (m, m) and right (m, n)."""
+    return _lapack().dgesv(matrix, right)[2]
+
+
+@on_one_thread
 def inverse_lower(factor: Array) -> Array:
     """The inverse of a lower triangular matrix (m, m), which is used up."""
-    from scipy.linalg.lapack import dtrtri
-
-    return dtrtri(factor.T, lower=0, overwrite_c=1)[0].T
+    return _lapack().dtrtri(factor.T, lower=0, overwrite_c=1)[0].T
 
 
 @on_one_thread
 def solved(factor: Array, right: Array, transposed: bool = False) -> Array:
     """factor^-1 @ right, or factor'^-1 @ right, for a lower triangular matrix (m, m)."""
-    from scipy.linalg.lapack import dtrtrs
-
-    return dtrtrs(factor.T, right, lower=0, trans=0 if transposed else 1)[0]
+    return _lapack().dtrtrs(factor.T, right, lower=0, trans=0 if transposed else 1)[0]

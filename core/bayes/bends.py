@@ -18,6 +18,7 @@ from ..arguments import SMALLEST, Array
 from ..contours.contour import Contour
 from ..contours.curves import RIDGE
 from ..contours.local_geometry import Frame
+from ..lapack import solved_square
 from ..verdict import SIGNIFICANT
 
 # M bends, or LEAST_BENDS if there are fewer, show a curvature to the share (FEW_BENDS / M)^3. Fewer than
@@ -51,7 +52,7 @@ class Bends(NamedTuple):
         """The covariance (3, 3) of the coefficients of x^2, xy and y^2, in unit radius, from few bends."""
         second = self.second
         # Outliers may leave two curves.
-        inverse = np.linalg.solve(second @ second.T + RIDGE * np.eye(3), second)
+        inverse = solved_square(second @ second.T + RIDGE * np.eye(3), second)
         covariance: Array = (inverse * self.stds**2) @ inverse.T
         return covariance
 
@@ -157,10 +158,11 @@ def _even(of: _Turns) -> Array:
 
     Beyond the ends of a curve its last steps follow in reverse order.
     """
-    from scipy.ndimage import median_filter
-
-    rates, ends = of.turns / np.maximum(of.steps, SMALLEST), np.bincount(of.curve).cumsum()[:-1]
-    return np.concatenate([median_filter(own, STEPS_AROUND, mode="mirror") for own in np.split(rates, ends)])
+    rates, half = of.turns / np.maximum(of.steps, SMALLEST), STEPS_AROUND // 2
+    start, last = of.curve.searchsorted(of.curve)[:, None], np.bincount(of.curve)[of.curve][:, None] - 1
+    around = np.arange(len(rates))[:, None] - start + np.arange(-half, half + 1)
+    mirrored = last - np.abs(around % np.maximum(2 * last, 1) - last)
+    return np.sort(rates[start + mirrored], axis=1)[:, half]
 
 
 def _unexplained(of: _Turns, beyond: Array) -> Array:

@@ -28,13 +28,14 @@ UNLIKELY = 1400.0  # The exponential of half this difference of -2 log likelihoo
 GROUP = 4  # The number of touches whose likelihoods are computed at once (benchmarks.speed, e20b52a).
 # Chosen with benchmarks.real.
 AMPLITUDES = np.array([0.003, 0.01, 0.04, 0.14, 0.5])  # Grid of the process's deviation, in unit radius.
-SEXTIC_WAVINESS = np.array([0.3, 0.6, 1.2])  # The waviness of the polynomials that a process competes with.
 PROCESS_NOISES, MIDDLE = 3, 1  # Grid points of the noise, up to what the sextic leaves; the middle one.
 ODDS = 0.2  # There is a process from these odds on: it costs a smooth surface little.
 NEGLIGIBLE = 160.0  # If -2 log likelihood exceeds the best by more, no other noise is tried.
 # Largest prior variance of slopes and second derivatives in a model with a process: with 100 they run away if
 # curves end early.
 MOST_VARIANCE = 0.06
+# The prior variances of the polynomials that a process competes with, by their waviness.
+SEXTIC_VARIANCES = np.minimum(prior_variances(np.array([0.3, 0.6, 1.2])), MOST_VARIANCE)
 # The power of the likelihood in a model with a process, because neighbors on a curve show no waves between
 # curves.
 POWER = 0.1
@@ -115,10 +116,9 @@ def process_hyperparameters(
     neg2_logs = process_neg2_log_evidence(rows, kernels, prior, noises)
     p = likelihoods(neg2_logs.reshape(1, len(kernels), -1), POWER).reshape(neg2_logs.shape)
     noise = np.sqrt(p.sum(axis=(0, 1)) @ noises**2)
-    sextics = np.minimum(prior_variances(SEXTIC_WAVINESS), MOST_VARIANCE)
     gram, count = (rows @ rows.T)[None], np.array([rows.shape[1]])
     # What is added there to -2 log likelihood is taken off again.
-    without = neg2_log_evidence(gram, count, np.zeros_like(gram), sextics, np.array([[most]])) - 1.0
+    without = neg2_log_evidence(gram, count, 0.0 * gram, SEXTIC_VARIANCES, np.array([[most]])) - 1.0
     best = min(neg2_logs.min(), without.min())
     use_gp = np.exp(0.5 * (best - neg2_logs)).mean() > ODDS * np.exp(0.5 * (best - without)).mean()
     return Hyperparameters(prior, noise, p.sum(axis=2) @ AMPLITUDES**2), bool(use_gp)
@@ -138,13 +138,13 @@ def process_neg2_log_evidence(rows: Array, kernels: list[Array], prior: Array, n
         for side in (range(size // 2, size), range(size // 2 - 1, -1, -1)):
             before = row[side.start - side.step, MIDDLE]
             for j in side:
-                row[j, MIDDLE] = now = at(i, AMPLITUDES[j], noises[MIDDLE])
+                row[j, MIDDLE] = now = at(i, float(AMPLITUDES[j]), float(noises[MIDDLE]))
                 if now > max(before, neg2_logs.min() + NEGLIGIBLE):
                     break
                 before = now
     for i, j in np.argwhere(neg2_logs[..., MIDDLE] < neg2_logs.min() + NEGLIGIBLE).tolist():
         for k in {*range(PROCESS_NOISES)} - {MIDDLE}:
-            neg2_logs[i, j, k] = at(i, AMPLITUDES[j], noises[k])
+            neg2_logs[i, j, k] = at(i, float(AMPLITUDES[j]), float(noises[k]))
     return neg2_logs
 
 

@@ -8,6 +8,7 @@ touches at once: with one touch, most of the time goes into calling numpy.
 """
 
 import math
+from statistics import median
 from typing import NamedTuple
 
 import numpy as np
@@ -196,7 +197,7 @@ def _student_weights(residuals: Array, present: NDArray[np.bool_], floor: Array)
     """Weights of the contacts, (b, n): all 1 if none of a touch is outlying, 0 where there is no contact."""
     misses, weights = np.abs(residuals), present.astype(float)
     for i in np.flatnonzero((present & (misses > SIGNIFICANT * floor[:, None])).any(axis=1)):
-        ratios = misses[i] / max(floor[i], 1.4826 * float(np.median(misses[i][present[i]])))
+        ratios = misses[i] / max(floor[i], 1.4826 * median(misses[i][present[i]].tolist()))
         if ratios[present[i]].max() > SIGNIFICANT:
             weights[i] *= (STUDENT + 1.0) / (STUDENT + ratios**2)
     return weights

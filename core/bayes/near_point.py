@@ -9,6 +9,7 @@ fold bends the patch, the quartic of least squares of the contacts within this s
 import numpy as np
 
 from ..arguments import Array
+from ..lapack import solved_square
 from ..patch.monge import TERMS, monomials
 from .posterior import QUARTIC_SHARE, SurfacePosterior, bent, normal_curvature_variances, terms_to
 from .prior import FREE
@@ -30,7 +31,7 @@ def curvature_contradiction(contacts: Array, posterior: SurfacePosterior, covari
         return 0.0
     basis = monomials(near, TERMS)[:, : terms_to(4)]
     gram = basis.T @ basis
-    inverse = np.linalg.inv(gram + INVISIBLE * gram.trace() * np.eye(len(gram)))
+    inverse = solved_square(gram + INVISIBLE * gram.trace() * np.eye(len(gram)), np.eye(len(gram)))
     rank = float((inverse * gram).sum())
     if len(near) < CONTACTS_PER_RANK * rank:
         return 0.0

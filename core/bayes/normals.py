@@ -21,6 +21,7 @@ from ..arguments import Array
 from ..contours.contour import Contour
 from ..contours.curves import distances_from_point, has_measured_normals, stacked
 from ..contours.local_geometry import Frame
+from ..lapack import cholesky, solved
 from ..patch.monge import PARTIALS, TERMS, derived_monomials
 from .posterior import SurfacePosterior
 from .prior import FREE
@@ -80,8 +81,8 @@ def contradiction(contacts: Array, normals: Array, posterior: SurfacePosterior) 
     weights = np.ones((1, len(normals)))
     (slopes,), (steepness,) = slope_equations(normals[None], contacts[None], weights)
     covariance = slopes @ posterior.covariance @ slopes.T + np.eye(len(slopes))
-    whitened = np.linalg.solve(
-        np.linalg.cholesky(covariance),
+    whitened = solved(
+        cholesky(covariance),
         np.column_stack([steepness - slopes @ posterior.mean, slopes[:, :FREE]]),
     )
     off, free = whitened[:, 0], whitened[:, 1:]

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array
-from ..lapack import solved
+from ..lapack import solved, solved_square
 from ..patch.differential_geometry import Derivatives
 from ..patch.monge import (
     DEGREE,
@@ -118,7 +118,7 @@ class SurfacePosterior(HeightField):
         z: Array = monomials(at, TERMS) @ self.mean
         if len(self.places):
             z += weighted_kernel(at, self.places, self.variances, self.alpha)
-        return z.reshape(np.broadcast_shapes(np.shape(x), np.shape(y)))
+        return z.reshape(np.broadcast(x, y).shape)
 
     def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
         """Height, slopes and second derivatives of the mean at (x, y)."""
@@ -177,6 +177,12 @@ class SurfacePosterior(HeightField):
         return places_factor(kernel(self.places, self.places, self.variances))
 
     @cached_property
+    def _projected_within(self) -> Array:
+        """Covariances (m, 27) of g at the places with the coefficients that the projection makes of it."""
+        at, weights = _projection()
+        return kernel(self.places, at, self.variances) @ weights.T
+
+    @cached_property
     def polynomial(self) -> Array:
         """The coefficients (27,) of the polynomial that describes the mean of z in its Darboux frame.
 
@@ -188,9 +194,7 @@ class SurfacePosterior(HeightField):
             return self.sextic.mean
         if not len(self.places):
             return self.mean
-        at, weights = _projection()
-        quartic: Array = _projected_terms() @ self.mean
-        quartic += weights @ weighted_kernel(at, self.places, self.variances, self.alpha)
+        quartic: Array = _projected_terms() @ self.mean + self.alpha @ self._projected_within
         mean, half = quartic[2] + quartic[4], math.hypot(quartic[2] - quartic[4], quartic[3])
         quartic[:FREE] = 0.0, 0.0, 0.5 * (mean - half), 0.0, 0.5 * (mean + half)
         return quartic
@@ -203,9 +207,8 @@ class SurfacePosterior(HeightField):
         if not len(self.places):
             root = self.root[:, :-1]
             return root.T @ root
-        at, weights = _projection()
-        within = kernel(self.places, at, self.variances) @ weights.T
-        known, left = self._whitened_sums(_projected_terms().T, weights.sum(axis=1), within)
+        ones = _projection()[1].sum(axis=1)
+        known, left = self._whitened_sums(_projected_terms().T, ones, self._projected_within)
         own = sum(map(np.multiply, self.variances, _projected_kernels(tuple(process.LENGTHS))))
         return own + left.T @ left - known.T @ known
 
@@ -255,7 +258,7 @@ class SurfacePosterior(HeightField):
             return False
         apart = _UNLIKE_SPHERE @ self.polynomial
         apart_covariance = _UNLIKE_SPHERE @ self.covariance @ _UNLIKE_SPHERE.T
-        return float(apart @ np.linalg.solve(apart_covariance, apart)) <= ROUND
+        return float(apart @ solved_square(apart_covariance, apart)) <= ROUND
 
     def curvature_std(self) -> float:
         """Standard deviation of the normal curvature at the origin, in the direction where it is largest."""
@@ -368,7 +371,9 @@ def nearest_quartic(mean: Array, alpha: Array, places: Array, variances: Array) 
 
 def _rows(x: ArrayLike, y: ArrayLike) -> Array:
     """Points (n, 2) of raveled x and y."""
-    return np.array(np.broadcast_arrays(x, y), dtype=float).reshape(2, -1).T
+    points = np.empty((*np.broadcast(x, y).shape, 2))
+    points[..., 0], points[..., 1] = x, y
+    return points.reshape(-1, 2)
 
 
 @cache

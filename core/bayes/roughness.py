@@ -10,11 +10,10 @@ import math
 import numpy as np
 
 from ..arguments import Array
-from ..patch.monge import TERMS
-from .evidence import Hyperparameters
+from ..lapack import solved_definite
+from ..patch.monge import TERMS, monomials
 from .joint_fit import MISFIT
 from .prior import USUAL_VARIANCES
-from .sextic import mean_given, sextics
 
 # benchmarks.extents of e20b52a judged these.
 EXPLAINED_TERMS = 15  # Three curves show this many of the 27 terms, which take as many degrees of freedom.
@@ -31,10 +30,9 @@ def roughness(contacts: Array, noise: float) -> float:
     if radius == 0.0:
         return 0.0
     local /= radius
-    data = sextics(
-        local[None], np.ones((1, len(local))), np.zeros((1, len(TERMS))), local[None, :0], np.zeros(1)
-    )
-    usual = Hyperparameters(USUAL_VARIANCES[None], np.array([MISFIT]))
-    off = data.residuals(mean_given(data, usual))[0]
+    basis, heights = monomials(local, TERMS), local[:, 2]
+    precision = basis.T @ basis
+    precision.flat[:: len(TERMS) + 1] += MISFIT**2 / USUAL_VARIANCES
+    off = heights - basis @ solved_definite(precision, heights @ basis)
     variance = float(off @ off) / max(len(off) - EXPLAINED_TERMS, 1)
     return math.sqrt(max(variance - (NOISY * noise / radius) ** 2, 0.0))

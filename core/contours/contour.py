@@ -153,14 +153,14 @@ class Contour:
     def part(self, which: slice | NDArray[Any], stops: tuple[str, str] | None) -> "Contour":
         """The contour of some of its contacts, or of all in another order."""
         normals = None if self.normals is None else self.normals[which]
-        return self._with_valid(points=self.points[which], normals=normals, stops=stops)
+        return self.with_valid(points=self.points[which], normals=normals, stops=stops)
 
     def copied(self) -> "Contour":
         """A copy whose arrays cannot be written to."""
         arrays = {key: read_only(value) for key, value in vars(self).items() if isinstance(value, np.ndarray)}
-        return self._with_valid(**arrays)
+        return self.with_valid(**arrays)
 
-    def _with_valid(self, **values: Any) -> "Contour":
+    def with_valid(self, **values: Any) -> "Contour":
         """The contour with other values, which are valid, so that none is checked again."""
         contour = object.__new__(Contour)
         set_fields(contour, **vars(self) | values)
@@ -243,13 +243,13 @@ def consistently_oriented(normals: Array, order: NDArray[np.intp], starts: NDArr
     return np.where(side[:, None] < 0.0, -unit, unit)
 
 
-def stops_at(contours: Iterable[Contour], point: ArrayLike, reach: float = 0.0) -> list[str]:
+def stops_at(contours: Iterable[Contour], point: Sequence[float] | Array, reach: float = 0.0) -> list[str]:
     """Why half curves end within the length `reach` of a point (3,) already: it is at a crease or an edge."""
     return [
         stop
         for contour in contours
-        for end, stop in zip(contour.points[[0, -1]], contour.stops or (), strict=False)
-        if stop in SURFACE_STOPS and np.linalg.norm(end - point) <= reach
+        for end, stop in zip((0, -1), contour.stops or (), strict=False)
+        if stop in SURFACE_STOPS and math.dist(contour.points[end], point) <= reach
     ]
 
 

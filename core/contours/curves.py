@@ -142,7 +142,8 @@ def local_curves(curves: Curves) -> tuple[Array, Array]:
     basis = (near & determined[:, None])[..., None] * (s / scale)[..., None] ** np.arange(3)
     transposed = basis.swapaxes(1, 2)
     # All s may be the same.
-    inverse = np.linalg.inv(transposed @ basis + RIDGE * np.eye(3))
+    values, vectors = np.linalg.eigh(transposed @ basis + RIDGE * np.eye(3))
+    inverse = (vectors / values[:, None]) @ vectors.swapaxes(1, 2)
     solution = inverse @ (transposed @ r)
     off = r - basis @ solution
     variance = np.einsum("cni,cni->c", off, off) / np.maximum(count - 3, 1)

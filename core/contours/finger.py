@@ -100,8 +100,9 @@ def section(surface: Surface, origin: Vector, t: Vector, u: Vector, side: float)
 def contact_of(hit: Hit, side: float) -> Contact:
     """The point and `side` times the normal that a surface answered. Raises ValueError if these are none."""
     try:
+        (x, y, z), (nx, ny, nz) = hit
         # Surfaces may answer in single precision, in which the rays of a finger would stray.
-        (x, y, z), (nx, ny, nz) = (map(float, vector) for vector in hit)
+        x, y, z, nx, ny, nz = map(float, (x, y, z, nx, ny, nz))
         # NaN fails every comparison, so it is refused, too.
         sound = abs(x) + abs(y) + abs(z) <= LARGEST and abs(nx * nx + ny * ny + nz * nz - 1.0) < 1e-2
     except (TypeError, ValueError, OverflowError):

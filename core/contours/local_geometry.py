@@ -63,7 +63,8 @@ def principal_curvatures(
     rows = np.empty((*phi.shape, 3))
     rows[..., 0], rows[..., 1], rows[..., 2] = known, np.cos(2.0 * phi) * known, np.sin(2.0 * phi) * known
     turned = np.swapaxes(rows, -1, -2)
-    solution = np.linalg.solve(turned @ rows, turned @ kappa[..., None])
+    values, vectors = np.linalg.eigh(turned @ rows)
+    solution = vectors @ (np.swapaxes(vectors, -1, -2) @ (turned @ kappa[..., None]) / values[..., None])
     mean, a, b = solution[..., 0, 0], solution[..., 1, 0], solution[..., 2, 0]
     half = np.hypot(a, b)
     umbilic = half <= UMBILIC * np.maximum(1.0, np.abs(known * kappa).max(axis=-1))

@@ -55,7 +55,7 @@ def tracker(
     tangent: ArrayLike | None = None,
     least_cosine: float = -1.0,
 ) -> Callable[[float], list[Contour]]:
-    """`track` as a function of the extent, which continues its contours at a longer one.
+    """`track` as a function of the extent, which continues the contours that it has.
 
     least_cosine : a contour ends where the normals of two contacts turn by more than this cosine's angle
     """
@@ -65,18 +65,18 @@ def tracker(
     noise, generator = number("noise", noise, least=0.0), generator_of(rng)
     e1 = tangent_of(n, tangent)
     start, up, side = first_contact(checked(surface), vector_of(p), n, e1, step)
-    curves = []
+    first, curves = Contour(p[None], None, np.array([up]), noise), []
     for plane in planes:
         t, u, across = plane.axes_of_unit_vectors(n, e1)
         cast, up_in_plane = section(surface, start, t, u, side), complex(dot(up, t), dot(up, u))
         # The curve's normal, turned clockwise by a quarter, is its tangent.
         halves = [_Half(contacts(cast, up_in_plane, turn, n, step, least_cosine)) for turn in (1j, -1j)]
-        curves.append(_Curve(across, halves, p[None], np.array([up])))
+        curves.append(_Curve(first.with_valid(plane_normal=np.array(across)), across, halves))
 
     def contours(extent: float) -> list[Contour]:
         """The contours to this extent, a length. Raises ValueError if it is not a length of several steps."""
         count = _half_count(extent, step)
-        return [_extended(curve, count, noise, generator) for curve in curves]
+        return [_extended(curve, count, generator) for curve in curves]
 
     return contours
 
@@ -101,28 +101,30 @@ class _Half:
 
 @dataclass(eq=False)
 class _Curve:
-    """The part of a contour that was followed, and the normal of its plane; points and normals are (n, 3)."""
+    """The part of a contour that was followed, the normal of its plane, and what goes on from its ends."""
 
+    contour: Contour
     across: Vector
     halves: list[_Half]
-    points: Array
-    normals: Array
 
 
-def _extended(curve: _Curve, count: int, noise: float, generator: np.random.Generator) -> Contour:
-    """The contour of `count` contacts on either side; contacts keep the noise that they have."""
+def _extended(curve: _Curve, count: int, generator: np.random.Generator) -> Contour:
+    """The contour of up to `count` contacts on either side; contacts keep the noise that they have."""
     back, ahead = (_next_contacts(half, count) for half in curve.halves)
     if back or ahead:
+        of, behind = curve.contour, len(back)
         points, normals = np.array([*back[::-1], *ahead]).transpose(1, 0, 2)
-        if noise:
+        if of.noise:
             # The point has none.
-            offsets = np.delete(generator.normal(0.0, noise, len(points) + 1), len(back))
+            offsets = np.delete(generator.normal(0.0, of.noise, len(points) + 1), behind)
             points = points + offsets[:, None] * _curve_normals(normals, curve.across)
-        behind = len(back)
-        curve.points = np.concatenate([points[:behind], curve.points, points[behind:]])
-        curve.normals = np.concatenate([normals[:behind], curve.normals, normals[behind:]])
-    stops = curve.halves[0].stop, curve.halves[1].stop
-    return Contour(curve.points, np.array(curve.across), curve.normals, noise, stops)
+        curve.contour = of.with_valid(
+            points=np.concatenate([points[:behind], of.points, points[behind:]]),
+            normals=np.concatenate([normals[:behind], of.normals, normals[behind:]]),
+        )
+    at, (before, after) = curve.halves[0].count, (min(half.count, count) for half in curve.halves)
+    stops = [EXTENT if half.count > count else half.stop for half in curve.halves]
+    return curve.contour.part(slice(at - before, at + after + 1), (stops[0], stops[1]))
 
 
 def _next_contacts(half: _Half, count: int) -> list[tuple[Vector, Vector]]:

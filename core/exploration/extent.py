@@ -7,9 +7,9 @@ So touches of one surface can go side by side, and their fits be done in stacks.
 """
 
 import math
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -89,8 +89,7 @@ class Touch:
     point : (3,)
     reference : columns e1, n and e1 x n, from which azimuths are measured
     farthest : a length that no half curve exceeds
-    followed : by step, the function that tracks the contours of the options' planes, the longest extent so
-        far, and the contours to this extent
+    followed : by step, what follows the contours of the options' planes to a given extent
     tapped : contacts of taps, (n, 3) each
     """
 
@@ -100,7 +99,7 @@ class Touch:
     reference: Array
     farthest: float
     options: ExplorationOptions
-    followed: dict[float, tuple[Follow, float, list[Contour]]] = field(default_factory=dict)
+    followed: dict[float, Follow] = field(default_factory=dict)
     tapped: list[Array] = field(default_factory=lambda: [np.empty((0, 3))])
 
     def steps(self) -> Steps:
@@ -111,9 +110,9 @@ class Touch:
             if method != "bayes":
                 r = yield from _fitted(explored.contours)
                 shape = explored.result.shape_curvatures
-                explored = replace(explored, result=replace(r, shape_curvatures=shape))
+                explored = replace(explored, result=r.judged_with(shape_curvatures=shape))
         else:
-            explored = yield from self._felt(extent / CONTACTS, CONTACTS)
+            explored = yield from self._felt(extent, self._denser(extent / CONTACTS, CONTACTS))
         explored = self._with_taps(explored)
         stds = [explored.result.mean_height_std]
         while (
@@ -141,25 +140,27 @@ class Touch:
         tried: list[Exploration] = []
         rough: dict[tuple[float, int], float] = {}
         for rung in self._rungs():
-            roughness = self._roughness(rung)
-            if roughness > ROUGH:
-                rough[rung] = roughness / math.prod(rung)
+            denser, extent = self._denser(*rung), math.prod(rung)
+            first = next(denser)
+            if (roughness := self._roughness(first[0])) > ROUGH:
+                rough[rung] = roughness / extent
                 continue
             try:
-                explored = yield from self._felt(*rung)
+                explored = yield from self._felt(extent, chain([first], denser))
             except DegenerateCurvesError:
                 continue
-            if _is_sure(explored, self.options):
+            if _is_sure(explored.result, self.options) and _explains(explored, self.options):
                 explored = self._with_taps(explored)
-                if _is_sure(explored, self.options):
+                if _is_sure(explored.result, self.options):
                     return explored
             tried.append(explored)
             if _are_shorter_worse(explored.result):
                 break
         if rough or not tried:
             longest = self.farthest / MOST_CONTACTS, MOST_CONTACTS
+            rung = min(rough, key=rough.__getitem__, default=longest)
             try:
-                tried.append((yield from self._felt(*min(rough, key=rough.__getitem__, default=longest))))
+                tried.append((yield from self._felt(math.prod(rung), self._denser(*rung))))
             except DegenerateCurvesError:
                 if not tried:
                     raise
@@ -174,12 +175,11 @@ class Touch:
         # The shortest half curves lie in the fewest facets, which give curvatures that the shape may have.
         shortest = min(tried, key=lambda e: e.extent).result
         shape = with_facets(shortest, self.surface).shape_curvatures
-        judged = [replace(e, result=replace(e.result, shape_curvatures=shape)) for e in tried]
+        judged = [replace(e, result=e.result.judged_with(shape_curvatures=shape)) for e in tried]
         return min(judged, key=lambda e: (e.result.status != OK, max(e.result.k1_std, e.result.k2_std)))
 
-    def _roughness(self, rung: tuple[float, int]) -> float:
-        """How rough contacts of this step and number are; infinite if a half curve ends at the point."""
-        contours, _ = next(self._denser(*rung))
+    def _roughness(self, contours: list[Contour]) -> float:
+        """How rough the contacts of contours are; infinite if a half curve ends at the point."""
         if stops_at(contours, self.point):
             return math.inf
         points = np.vstack([contour.points for contour in contours])
@@ -199,15 +199,15 @@ class Touch:
             counts = (MOST_CONTACTS * shares * finest / step + 1e-6).astype(int).tolist()
             yield from ((step, count) for count, shorter in pairwise(counts) if min(longest, count) > shorter)
 
-    def _felt(self, step: float, count: int) -> Steps:
+    def _felt(self, extent: float, denser: Iterable[tuple[list[Contour], float]]) -> Steps:
         """The touch with half curves of this length, and the first number of contacts that suffices."""
-        for contours, between in self._denser(step, count):  # noqa: B007
+        for contours, between in denser:  # noqa: B007
             r = yield Request(contours, self.options.extent is None)
             if isinstance(r, Reconstruction) and suffices(r):
                 break
         if isinstance(r, DegenerateCurvesError):
             raise r
-        return Exploration(contours, r, step * count, between, tuple(self.options.planes))
+        return Exploration(contours, r, extent, between, tuple(self.options.planes))
 
     def _denser(self, step: float, count: int) -> Iterator[tuple[list[Contour], float]]:
         """Contours of half curves of `count` contacts, and then of more in the same length; and their steps.
@@ -229,30 +229,25 @@ class Touch:
             return explored
         taps, contacts = tapped(self.surface, r, np.concatenate(self.tapped))
         self.tapped.append(contacts)
-        r = replace(r, taps=taps, known_height_std=r.mean_height_std)
-        return replace(explored, result=with_facets(r, self.surface))
+        return replace(explored, result=with_facets(r.judged_with(taps=taps), self.surface))
 
     def _followed(self, step: float, extent: float) -> list[Contour]:
-        """The contours of the planes with contacts this step apart, at least to an extent."""
+        """The contours of the planes with contacts this step apart, to an extent."""
         if step not in self.followed:
-            self.followed[step] = self.follow(self.options.planes, step=step), 0.0, []
-        follow, longest, contours = self.followed[step]
-        if extent > longest:
-            self.followed[step] = follow, extent, (contours := follow(extent))
-        return contours
+            self.followed[step] = self.follow(self.options.planes, step=step)
+        return self.followed[step](extent)
 
     def _cut(self, step: float, count: int) -> list[Contour]:
         """The contours of the planes with half curves of `count` contacts this step apart."""
         contours = self._followed(step, step * count)
-        if count >= int(self.farthest / step * (1.0 + 1e-6)):
-            return contours
-        return [_shortened(contour, self.point, count) for contour in contours]
+        is_farthest = count >= int(self.farthest / step * (1.0 + 1e-6))
+        return contours if is_farthest else list(map(_ended, contours))
 
     def _with_plane(self, explored: Exploration, plane: SamplingPlane) -> Steps:
         """The touch with one plane more. Raises ValueError if nothing can be felt along it."""
         (more,) = self.follow((plane,), step=explored.step)(explored.extent)
         if explored.extent < self.farthest:
-            more = _shortened(more, self.point, len(more.points))
+            more = _ended(more)
         contours, planes = [*explored.contours, more], (*explored.planes, plane)
         r = yield from _fitted(contours)
         return self._with_taps(replace(explored, contours=contours, result=r, planes=planes))
@@ -279,16 +274,15 @@ def suffices(r: Reconstruction) -> bool:
 def _are_shorter_worse(r: Reconstruction) -> bool:
     """Whether a patch is in doubt for a reason that shorter half curves make worse: noise, or few facets."""
     is_noisy = r.mean_height_std > DOUBTFUL_STD * r.radius and not suffices(r)
-    return is_noisy or (r.gravest is not None and r.gravest.code == "facets" and len(r.doubts) == 1)
+    return is_noisy or (len(r.shape_curvatures) > 0 and [doubt.code for doubt in r.doubts] == ["facets"])
 
 
-def _is_sure(explored: Exploration, options: ExplorationOptions) -> bool:
-    """Whether a touch is as certain as the options require, and its patch explains contacts and taps."""
-    r = explored.result
+def _is_sure(r: Reconstruction, options: ExplorationOptions) -> bool:
+    """Whether a patch is as certain as the options require, and taps show the surface there."""
     off = 0.0 if r.taps is None else (r.taps.height or 0.0) / r.radius + r.taps.missing
-    is_ok = r.status == OK and off <= TAPS_OFF
-    is_certain = r.mean_height_std <= options.largest_std if options.largest_std else is_ok
-    return is_certain and _explains(explored, options)
+    # Of all doubts, the deviation of the height is the one that is known already.
+    is_certain = r.mean_height_std <= (options.largest_std or DOUBTFUL_STD * r.radius)
+    return is_certain and (options.largest_std is not None or (r.status == OK and off <= TAPS_OFF))
 
 
 def _explains(explored: Exploration, options: ExplorationOptions) -> bool:
@@ -296,21 +290,19 @@ def _explains(explored: Exploration, options: ExplorationOptions) -> bool:
     r = explored.result
     x, y, z = r.frame.to_local(np.concatenate([contour.points for contour in explored.contours])).T
     off, noise = z - r.height(x, y), max(options.noise, float(r.posterior.noise) * r.radius)
-    far = too_far(off, np.hypot(r.height_std(x, y), noise)) & (np.abs(off) > (options.largest_std or 0.0))
+    far = too_far(off, noise) & (np.abs(off) > (options.largest_std or 0.0))
+    if far.any():  # Noise alone explains most contacts.
+        far[far] = too_far(off[far], np.hypot(r.height_std(x[far], y[far]), noise))
     return are_few(far, np.append(far[1:], False))
 
 
 def _side_counts(contour: Contour, point: Array) -> tuple[int, int]:
     """The numbers of contacts on either side of a point, which is one of them."""
-    at = int(np.argmax((contour.points == point).all(axis=1)))
+    at = contour.points.tolist().index(point.tolist())
     return at, len(contour.points) - 1 - at
 
 
-def _shortened(contour: Contour, point: Array, count: int) -> Contour:
-    """The contour of at most `count` contacts on either side of a point, with the stops of such a one."""
-    before, after = _side_counts(contour, point)
-    stops = [
-        UNEXPLAINED if n > count or stop == EXTENT else stop
-        for n, stop in zip((before, after), contour.stops or (), strict=True)
-    ]
-    return contour.part(slice(max(before - count, 0), before + count + 1), (stops[0], stops[1]))
+def _ended(contour: Contour) -> Contour:
+    """The contour of a touch that ends half curves itself, where the surface does not."""
+    stops = (UNEXPLAINED if stop == EXTENT else stop for stop in contour.stops or ())
+    return contour.with_valid(stops=tuple(stops))

@@ -3,15 +3,15 @@
 """The curvatures of the shape that the facets of a mesh stand for, where a touch has felt few of them."""
 
 import math
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
-from functools import cache, partial
+from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import SMALLEST, Array
+from ..contours.contour import cross
 from ..patch.differential_geometry import Derivatives
 from ..reconstruction.result import Reconstruction
 
@@ -34,7 +34,7 @@ NEIGHBOR_STEP = 0.05  # The neighbor across an edge is the facet at this share o
 class FacetedSurface(Protocol):
     """A surface that consists of flat faces."""
 
-    def face_near(self, point: Array) -> int:
+    def face_near(self, point: Sequence[float] | Array) -> int:
         """The number of the face nearest to a point (3,) of the world."""
 
     def corners_of(self, number: int) -> ArrayLike:
@@ -49,7 +49,7 @@ class Facet(NamedTuple):
 
     def width(self, edge: Array) -> float:
         """The width of the face across the direction of an edge (3,), a length; 0 for an edge without one."""
-        across, length = np.cross(edge, self.normal), float(np.linalg.norm(edge))
+        across, length = cross(edge, self.normal), math.hypot(*edge)
         return float(np.ptp(self.corners @ across)) / length if length else 0.0
 
 
@@ -60,7 +60,7 @@ def with_facets(r: Reconstruction, surface: object) -> Reconstruction:
     radius. A facet whose edges are all sharp or those of fillets, as that of a cube, is the shape itself.
     """
     shape = _shape_curvatures(r, surface) if isinstance(surface, FacetedSurface) else None
-    return replace(r, shape_curvatures=np.array(shape)) if shape else r
+    return r.judged_with(shape_curvatures=np.array(shape)) if shape else r
 
 
 def _shape_curvatures(r: Reconstruction, mesh: FacetedSurface) -> list[Array]:
@@ -68,10 +68,9 @@ def _shape_curvatures(r: Reconstruction, mesh: FacetedSurface) -> list[Array]:
     width = _smooth_width(r.frame.origin, mesh)
     if width < max(MIN_WIDTH_RATIO * r.radius, SMALLEST):
         return []
-    facet, around = cache(lambda face: _facet(mesh, face)), partial(_around, r, mesh, width)
-    points = around(TURNING)
-    by_turning = _turning(r, points, [facet(mesh.face_near(point)) for point in points])
-    faces_within = [set(map(mesh.face_near, around(share))) for share in CORNERS]
+    facet, (points, *corners) = cache(lambda face: _facet(mesh, face)), _around(r, mesh, width)
+    by_turning = _turning(r, points, [facet(face) for face in map(mesh.face_near, points.tolist())])
+    faces_within = [set(map(mesh.face_near, near.tolist())) for near in corners]
     by_corners = [_of_corners(r, map(facet, faces)) for faces in faces_within]
     return [by_turning, *(estimate for estimate in by_corners if estimate is not None)]
 
@@ -81,11 +80,12 @@ def is_beside_bend(point: Array, mesh: FacetedSurface) -> bool:
     return _smooth_width(point, mesh) > 0.0
 
 
-def _around(r: Reconstruction, mesh: FacetedSurface, width: float, share: float) -> Array:
-    """Points (n, 3) of the world along the curves and these turned around the normal, to a share of widths.
+def _around(r: Reconstruction, mesh: FacetedSurface, width: float) -> list[Array]:
+    """Points (n, 3) of the world along the curves and these turned around the normal.
 
-    Widths are those of the facet at the point in each direction, and at most the given one. Where facets
-    narrow, as near the tip of a cone, the points end where the patch has turned by SMOOTH.
+    They go to TURNING and, in the others, to CORNERS widths of the facet at the point in each direction, all
+    at most the given one. Where facets narrow, as near the tip of a cone, points end where the patch has
+    turned by SMOOTH.
     """
     x, y, z = r.frame.to_local(np.vstack([contour.points for contour in r.contours])).T / r.radius
     turned = [(x * c - y * s, x * s + y * c, z) for c, s in zip(np.cos(TURNS), np.sin(TURNS), strict=True)]
@@ -93,9 +93,8 @@ def _around(r: Reconstruction, mesh: FacetedSurface, width: float, share: float)
     spans = np.ptp(points[:, :2] @ r.frame.to_local(corners)[:, :2].T, axis=1)
     widths = np.minimum(spans / np.maximum(np.hypot(*points[:, :2].T), SMALLEST), width)
     steepness = max(abs(r.k1), abs(r.k2)) / SMOOTH
-    return r.frame.to_world(
-        points / np.maximum(steepness, 1.0 / np.maximum(share * widths, SMALLEST))[:, None]
-    )
+    limits = (np.maximum(share * widths, SMALLEST)[:, None] for share in (TURNING, *CORNERS))
+    return [r.frame.to_world(points / np.maximum(steepness, 1.0 / limit)) for limit in limits]
 
 
 def _turning(r: Reconstruction, points: Array, facets: list[Facet]) -> Array:
@@ -144,12 +143,12 @@ def _bends(point: Array, mesh: FacetedSurface) -> Iterator[tuple[float, float]]:
     """The widths of the facet at a point and of its neighbor across each edge that turns as a smooth bend."""
     facet = _facet(mesh, mesh.face_near(point))
     starts, along = facet.corners, np.roll(facet.corners, -1, axis=0) - facet.corners
-    outward = np.cross(along, facet.normal)
+    outward = np.array(cross(along.T, facet.normal)).T
     for start, edge, out in zip(starts, along, outward, strict=True):
-        if not np.any(out):
+        if not out.any():
             continue
         width = facet.width(edge)
-        beyond = start + 0.5 * edge + NEIGHBOR_STEP * width * out / np.linalg.norm(out)
+        beyond = start + 0.5 * edge + NEIGHBOR_STEP * width * out / math.hypot(*out)
         neighbor = _facet(mesh, mesh.face_near(beyond))
         if math.cos(SMOOTH) < float(facet.normal @ neighbor.normal) < math.cos(DISTINCT):
             yield width, neighbor.width(edge)
@@ -158,5 +157,5 @@ def _bends(point: Array, mesh: FacetedSurface) -> Iterator[tuple[float, float]]:
 def _facet(mesh: FacetedSurface, number: int) -> Facet:
     """The face of this number; its normal is 0 if it has no area."""
     points = np.asarray(mesh.corners_of(number), dtype=float)
-    across = np.cross(points[1:-1] - points[0], points[2:] - points[0]).sum(axis=0)
-    return Facet(points, across / (float(np.linalg.norm(across)) or 1.0))
+    across = np.sum(cross((points[1:-1] - points[0]).T, (points[2:] - points[0]).T), axis=1)
+    return Facet(points, across / (math.hypot(*across) or 1.0))

@@ -141,6 +141,7 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
     """
     explored: dict[int, Exploration | ValueError] = {}
     answers: dict[int, Answer | None] = dict.fromkeys(range(len(steps)))
+    methods, no_strokes = {m: replace(fit, method=m) for m in ("bayes", fit.method)}, gathered(())
     while answers:
         requests: dict[int, Request] = {}
         for i, answer in answers.items():
@@ -152,10 +153,9 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
                 explored[i] = error
             yield
         answers = {}
-        for method in dict.fromkeys(("bayes", fit.method)):
+        for method, options in methods.items():
             which = [i for i, r in requests.items() if ("bayes" if r.searching else fit.method) == method]
-            options = replace(fit, method=method)
-            touches = [TouchContacts(requests[i].contours, *gathered(())) for i in which]
+            touches = [TouchContacts(requests[i].contours, *no_strokes) for i in which]
             if which:
                 results = fitted(points[which], touches, outward[which], options)
                 answers.update(zip(which, results, strict=True))

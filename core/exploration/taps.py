@@ -51,10 +51,10 @@ def tapped(surface: Surface, r: Reconstruction, felt: Array) -> tuple[Taps, Arra
 
     Also returns the contacts of these taps, (m, 3). They have no noise: it would not change the verdict.
     """
-    where, weighted = places(r.domain), len(r.domain.nodes[1])
-    heights, (x, y) = heights_at(r, surface, where), where.T
+    feet, weighted = _on_patch(r, places(r.domain)), len(r.domain.nodes[1])
+    heights = heights_at(r, surface, feet)
     met = ~np.isnan(heights)
-    contacts = r.frame.to_world(np.column_stack([x, y, r.height(x, y) + heights])[met])
+    contacts = r.frame.to_world(feet[met] + np.outer(heights[met], [0.0, 0.0, 1.0]))
     local = r.frame.to_local(np.concatenate([contacts, felt]))
     x, y, z = local[r.domain.contains(*local[:, :2].T)].T
     off = np.abs(z - r.height(x, y))
@@ -69,7 +69,7 @@ def tapped(surface: Surface, r: Reconstruction, felt: Array) -> tuple[Taps, Arra
 
 def mesh_error(r: Reconstruction, surface: Surface) -> MeshError:
     """How far the surface is off the patch, by rays at the Gauss points of the domain."""
-    return mean_error(r, heights_at(r, surface, r.domain.nodes[0]))
+    return mean_error(r, heights_at(r, surface, _on_patch(r, r.domain.nodes[0])))
 
 
 def mean_error(r: Reconstruction, heights: Array) -> MeshError:
@@ -80,11 +80,16 @@ def mean_error(r: Reconstruction, heights: Array) -> MeshError:
     return MeshError(height, float(weights[~met].sum()))
 
 
-def heights_at(r: Reconstruction, surface: Surface, points: Array) -> Array:
-    """The height of the surface above the patch at local points (n, 2); NaN where there is no surface."""
-    feet, up = r.frame.to_world(np.column_stack([points, r.height(*points.T)])), vector_of(r.frame.axes[:, 2])
-    side = _side_of(r, surface)
-    heights = (layer_height(surface, vector_of(foot), up, r.radius, side) for foot in feet.tolist())
+def _on_patch(r: Reconstruction, points: Array) -> Array:
+    """The local points (n, 3) of the patch at local places (n, 2)."""
+    return np.column_stack([points, r.height(*points.T)])
+
+
+def heights_at(r: Reconstruction, surface: Surface, feet: Array) -> Array:
+    """The height of the surface above local points (n, 3) of the patch; NaN where there is no surface."""
+    up, side = vector_of(r.frame.axes[:, 2]), _side_of(r, surface)
+    starts = r.frame.to_world(feet).tolist()
+    heights = (layer_height(surface, vector_of(start), up, r.radius, side) for start in starts)
     return np.array([math.nan if height is None else height for height in heights])
 
 

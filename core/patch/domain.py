@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array
+from ..lapack import solved_square
 
 GRID = 600  # The grid (8) over a domain has about this number of points.
 BOUNDARY_SAMPLES = 1024  # With this number of samples the radius of the boundary is right to 1e-5.
@@ -70,7 +71,7 @@ class Domain:
             system[adjacent] = np.eye(len(rows))[adjacent]
             right[adjacent] = self.ends[adjacent] @ QUARTER_TURN
             right[adjacent] /= np.linalg.norm(self.ends[adjacent], axis=1, keepdims=True)
-        slopes = np.linalg.solve(system, right)
+        slopes = solved_square(system, right)
         bend = (slopes + slopes[following] - 2.0 * rise) / over
         pieces = np.array([self.ends, slopes, (rise - slopes) / over - bend, bend / over])
         pieces[1, straight], pieces[2:, straight] = rise[straight], 0.0

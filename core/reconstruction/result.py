@@ -23,7 +23,6 @@ from ..contours.contour import SURFACE_ENDS, Contour, read_only, stops_at
 from ..contours.curves import (
     Curves,
     curves_through,
-    distances_from_point,
     misses,
     stacked,
 )
@@ -58,7 +57,6 @@ class Reconstruction(Judged):
     taps : what taps between the curves have met; None without taps
     shape_curvatures : (n, 2), estimates of the principal curvatures, in order, of the shape that few facets
         stand for; none where the mesh is fine or unknown
-    known_height_std : mean_height_std, if it was computed before
     known_curves : the contours as Curves of one touch, in the world, if they were computed before
 
     All else is computed from these when it is first used, so contours and strokes are copies that cannot be
@@ -76,7 +74,6 @@ class Reconstruction(Judged):
     strokes: Array = field(default_factory=lambda: np.empty((0, 3)))
     taps: Taps | None = None
     shape_curvatures: Array = field(default_factory=lambda: np.empty((0, 2)))
-    known_height_std: float | None = None
     known_curves: Curves | None = None
 
     def __post_init__(self) -> None:
@@ -114,14 +111,14 @@ class Reconstruction(Judged):
     @cached_property
     def contacts(self) -> Array:
         """The fitted contacts without the reference point, (n, 3), in the frame."""
-        curves = zip(self.contours, self._off_point, strict=True)
-        points = np.concatenate([*(contour.points[off] for contour, off in curves), self.strokes])
-        return self.frame.to_local(points)
+        origin, curves = self.frame.origin, self._curves
+        points = curves.points[curves.present] + (self._meeting - origin)
+        return np.concatenate([points, self.strokes - origin]) @ self.frame.axes
 
     @cached_property
-    def _off_point(self) -> list[NDArray[np.bool_]]:
-        """Which contacts of each contour are not the reference point."""
-        return [distances_from_point(contour.points - self._meeting)[1] for contour in self.contours]
+    def _curves(self) -> Curves:
+        """The contours as seen from where they meet, in the world."""
+        return self.known_curves or curves_through(*stacked(self._meeting[None], [self.contours]))
 
     @property
     def _meeting(self) -> Array:
@@ -131,8 +128,7 @@ class Reconstruction(Judged):
     @cached_property
     def misses(self) -> Array:
         """Distance at which each of the c curves passes the reference point, and its deviation, (c, 2)."""
-        curves = self.known_curves or curves_through(*stacked(self._meeting[None], [self.contours]))
-        return misses(curves)[0, : len(self.contours)]
+        return misses(self._curves)[0, : len(self.contours)]
 
     @cached_property
     def posterior(self) -> SurfacePosterior:
@@ -183,8 +179,7 @@ class Reconstruction(Judged):
     @cached_property
     def mean_height_std(self) -> float:
         """The mean of height_std over the domain."""
-        known = self.known_height_std
-        return float(self.domain.nodes[1] @ self.node_stds) if known is None else known
+        return float(self.domain.nodes[1] @ self.node_stds)
 
     @cached_property
     def node_stds(self) -> Array:
@@ -263,7 +258,7 @@ class Reconstruction(Judged):
         fitted = float(self.posterior.noise)
         noises = [fitted if c.noise is None else c.noise / self.radius for c in self.contours]
         contours, most = self.contours, SIGNIFICANT * max(fitted, MISFIT) * self.radius
-        if self._departures.max() > most:
+        if np.abs(self._residuals).max() > most:
             contours = tuple(self._explained(c, most) if c.normals is None else c for c in contours)
         noise, terms = max(noises, default=0.0), self.posterior.polynomial[2:FREE]
         return bends_of(contours, self.frame, self.radius, noise, terms)
@@ -307,20 +302,20 @@ class Reconstruction(Judged):
         return self.null_space_dimension / terms_to(self.patch.degree)
 
     @cached_property
-    def _departures(self) -> Array:
-        """|dz| of the contacts, (n,)."""
+    def _residuals(self) -> Array:
+        """The heights of the surface above the contacts, (n,)."""
         x, y, z = self.contacts.T
-        return np.abs(self.height(x, y) - z)
+        return self.height(x, y) - z
 
     @property
     def fit_error(self) -> float:
         """The mean of |dz| over the contacts (6), a length."""
-        return float(self._departures.mean())
+        return float(np.abs(self._residuals).mean())
 
     @property
     def typical_miss(self) -> float:
         """The median of |dz| over the contacts, which outliers do not change."""
-        return median(self._departures.tolist())
+        return median(np.abs(self._residuals).tolist())
 
     @cached_property
     def waves(self) -> float:
@@ -331,7 +326,7 @@ class Reconstruction(Judged):
         if not self.posterior.amplitude:
             return 0.0
         basis = monomials(self.contacts / self.radius, exponents(1, 4))
-        height = self.height(*self.contacts[:, :2].T)
+        height = self.contacts[:, 2] + self._residuals
         off = height - basis @ np.linalg.lstsq(basis, height, rcond=None)[0]
         return math.sqrt(float(np.mean(off**2)))
 
@@ -361,9 +356,17 @@ class Reconstruction(Judged):
             strokes=end + scale * (self.strokes - start) @ turn.T,
             point=end,
             shape_curvatures=self.shape_curvatures / scale,
-            known_height_std=None,
             known_curves=None,
         )
+
+    def judged_with(self, **values: object) -> "Reconstruction":
+        """The same fit with other values that only its verdict depends on: `taps`, `shape_curvatures`.
+
+        What follows from the fit alone is kept; `mean_height_std` may be given if it is known.
+        """
+        other, of_these = object.__new__(Reconstruction), ("gravest", "doubts", "curvature_covariance")
+        set_fields(other, **{key: value for key, value in vars(self).items() if key not in of_these} | values)
+        return other
 
     @property
     def message(self) -> str:
@@ -424,7 +427,7 @@ class Reconstruction(Judged):
         """The number of deviations, and the share of L, by which a curve is off what the others show."""
         if self.method != "bayes" or len(self.contours) + (len(self.strokes) > 0) < LEAST_CURVES:
             return 0.0, 0.0
-        sizes = [int(np.count_nonzero(counted)) for counted in self._off_point]
+        sizes = self._curves.present[0].sum(axis=1)
         curve = np.repeat([*range(len(sizes)), -1], [*sizes, len(self.strokes)])
         return contradicting_curve(
             self.contacts / self.radius, curve, self.posterior, self.noise, self.point_std

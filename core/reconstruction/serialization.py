@@ -104,10 +104,9 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
         shape_curvatures=(
             np.empty((0, 2)) if shape is None else finite_array("shape_curvatures", shape, (None, 2), LARGEST)
         ),
-        known_height_std=number("mean_height_std", _value(d, "mean_height_std"), least=0.0),
     )
     _require_contacts(r)
-    return r
+    return r.judged_with(mean_height_std=number("mean_height_std", _value(d, "mean_height_std"), least=0.0))
 
 
 def _require_contacts(r: Reconstruction) -> None:

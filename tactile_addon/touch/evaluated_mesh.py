@@ -167,7 +167,7 @@ class PlacedMesh:
     Subclasses have `_nearest`, which gives the (point, normal) nearest to a point, in the mesh's coordinates.
     """
 
-    _nearest: Callable[[Array], Any]
+    _nearest: Callable[[Triple], Any]
 
     def __init__(self, linear: Array, origin: Array, cast: Callable[[Point, Point, float], Any]) -> None:
         self._linear, self._origin, self._cast = linear, origin, cast
@@ -183,10 +183,8 @@ class PlacedMesh:
         if self._is_in_place:
             point, normal = self._cast(origin, direction, distance)
             return None if point is None or not any(normal) else (point, normal)
-        back, (x, y, z) = self._inverse_rows, self._at
-        local = product(back, *direction)
-        start = product(back, origin[0] - x, origin[1] - y, origin[2] - z)
-        point, normal = self._cast(start, local, distance * math.hypot(*local))
+        local = product(self._inverse_rows, *direction)
+        point, normal = self._cast(self._to_local(origin), local, distance * math.hypot(*local))
         # A face without area has no normal and cannot be felt.
         if point is None or not any(normal):
             return None
@@ -235,8 +233,9 @@ class PlacedMesh:
         x, y, z = product(self._rows, *point)
         return x + self._at[0], y + self._at[1], z + self._at[2]
 
-    def _to_local(self, point: Point) -> Any:
-        return self._inverse @ np.subtract(point, self._origin)
+    def _to_local(self, point: Point) -> Triple:
+        x, y, z = self._at
+        return product(self._inverse_rows, point[0] - x, point[1] - y, point[2] - z)
 
     def _normal_to_world(self, normal: Point) -> Triple:
         """The normal by the inverse transpose: it stays outward under any scale, even one that mirrors."""

@@ -3,7 +3,7 @@
 """A mesh object of the scene as a surface to touch: as Blender evaluates it, in world coordinates."""
 
 import math
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import bpy
@@ -29,14 +29,15 @@ class MeshSurface(PlacedMesh):
     def __init__(self, obj: Object, depsgraph: bpy.types.Depsgraph, sound: bool = False) -> None:
         """Raises ValueError, with a sentence, if `obj` cannot be touched."""
         evaluated, linear, origin = evaluated_object(obj, depsgraph)
-        rays = evaluated.ray_cast
+        rays = evaluated.ray_cast  # Looking up a function of Blender takes longer than calling it.
 
         def cast(start: Point, direction: Point, distance: float) -> Any:
             hit, point, normal, _ = rays(start, direction, distance=distance, depsgraph=depsgraph)
             return (point, normal) if hit else (None, None)
 
         super().__init__(linear, origin, cast)
-        self._mesh, self._object, self._depsgraph = evaluated.data, evaluated, depsgraph
+        self._mesh, self._object = evaluated.data, evaluated
+        self._closest = partial(evaluated.closest_point_on_mesh, depsgraph=depsgraph)
         self.name, self.size = obj.name, size_of(evaluated, linear)
         if not sound:
             require_oriented(evaluated, self._co)
@@ -51,7 +52,7 @@ class MeshSurface(PlacedMesh):
         If these are more than `most`, there is only each second, third, ... of them.
         """
         # A sphere in the world is an ellipsoid in the object, which its longest axis bounds.
-        reach, at = radius * np.linalg.norm(self._inverse, ord=2), self._to_local(point).astype(np.float32)
+        reach, at = radius * np.linalg.norm(self._inverse, ord=2), np.array(self._to_local(point), np.float32)
 
         def within(co: Array) -> Array:
             local = co - at
@@ -121,14 +122,15 @@ class MeshSurface(PlacedMesh):
 
     def face_near(self, point: Point) -> int:
         """The number of the face nearest to a world point."""
-        return self._object.closest_point_on_mesh(self._to_local(point), depsgraph=self._depsgraph)[3]
+        return self._closest(self._to_local(point))[3]
 
     def corners_of(self, number: int) -> Array:
         """The corners (k, 3) of a face in the world, in order; counterclockwise, unless it is mirrored."""
-        co = np.array([self._mesh.vertices[i].co for i in self._mesh.polygons[number].vertices], dtype=float)
+        vertices = self._mesh.vertices
+        co = np.array([vertices[i].co[:] for i in self._mesh.polygons[number].vertices])
         return co @ self._linear.T + self._origin
 
-    def _nearest(self, local: Array) -> Any:
+    def _nearest(self, local: Triple) -> Any:
         """The nearest (point, normal) in object coordinates."""
-        found, point, normal, _ = self._object.closest_point_on_mesh(local, depsgraph=self._depsgraph)
+        found, point, normal, _ = self._closest(local)
         return (point, normal) if found else (None, None)

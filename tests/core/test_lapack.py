@@ -8,7 +8,9 @@ from threading import Barrier
 
 import numpy as np
 import pytest
+import surfaces
 
+import core
 from core import lapack
 
 MATRIX = np.cov(np.random.default_rng(1).normal(size=(12, 40)))
@@ -22,6 +24,7 @@ def test_agrees_with_numpy():
     np.testing.assert_allclose(lapack.solved(lower, RIGHT), np.linalg.solve(lower, RIGHT))
     np.testing.assert_allclose(lapack.solved(lower, RIGHT, transposed=True), np.linalg.solve(lower.T, RIGHT))
     np.testing.assert_allclose(lapack.solved_definite(MATRIX.copy(), RIGHT), np.linalg.solve(MATRIX, RIGHT))
+    np.testing.assert_allclose(lapack.solved_square(MATRIX, MATRIX[:, :2]), np.eye(12)[:, :2], atol=1e-12)
     np.testing.assert_allclose(lapack.inverse_lower(lower.copy()), np.linalg.inv(lower), atol=1e-12)
 
 
@@ -75,3 +78,12 @@ def test_calls_go_on_where_the_library_has_other_names(monkeypatch):
         np.testing.assert_allclose(lapack.cholesky(MATRIX.copy()), np.linalg.cholesky(MATRIX), atol=1e-14)
     finally:
         lapack._threads.cache_clear()
+
+
+def test_a_touch_calls_no_numpy_solver_which_has_threads_of_its_own(monkeypatch):
+    place = surfaces.sphere(1.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)
+    before = core.explore(*place, farthest=1.0)  # This also fills what is computed once.
+    for name in ("solve", "inv"):
+        monkeypatch.setattr(np.linalg, name, None)
+    after = core.explore(*place, farthest=1.0)
+    assert (after.result.message, after.result.k1_std) == (before.result.message, before.result.k1_std)

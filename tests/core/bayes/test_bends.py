@@ -140,6 +140,13 @@ def test_a_smooth_curve_bends_at_each_contact_however_these_are_spread(seed):
     assert found.folded == 0.0
 
 
+@pytest.mark.parametrize("count", [3, 4, 5, 6])
+def test_a_circle_bends_evenly_however_few_its_contacts_are(count):
+    angles = np.linspace(-0.2, 0.2, count)
+    found = bends([contour(angles, np.full(count - 1, 0.1))], k=-0.1)
+    assert found.folded == pytest.approx(0.0, abs=1e-9)
+
+
 @pytest.mark.parametrize("scale", [1e-3, 1.0, -40.0])
 def test_a_single_fold_is_one_bend_whatever_length_and_side_normals_have(scale):
     angles = np.where(np.arange(25) < 12, 0.0, 0.2)

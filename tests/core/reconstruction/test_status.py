@@ -327,7 +327,7 @@ def test_a_curve_may_miss_the_point_by_half_a_percent_of_the_radius_or_five_devi
 def test_heights_may_be_good_to_two_percent_of_the_radius(share, doubt):
     s = surfaces.pear()
     r = s.fit(contours_of(s))
-    assert (replace(r, known_height_std=share * r.radius).status == "uncertain") == doubt
+    assert (r.judged_with(mean_height_std=share * r.radius).status == "uncertain") == doubt
 
 
 @pytest.mark.parametrize(
