@@ -22,7 +22,7 @@ from ..steps import chunked, part_of, result_of
 from ..triangles import row_dot
 from ..verdict import Doubt, beyond
 from .charts import AZIMUTHS, Charts
-from .connectivity import Indices, connected_pieces
+from .connectivity import Indices, graph_of, pieces_of
 from .field import AGREE, INSIDE, sheet_facing
 from .finger import FACING
 from .join import stacked, tabulate
@@ -102,7 +102,7 @@ def cover_contacts(
     noise = None if noise is None else number("noise", noise, least=0.0)
     felt, noise, radius = _felt(contours_or_strokes, noise, largest)
     contacts, doubts = _contacts(*felt, outward, noise)
-    cloud = _Cloud(contacts, cKDTree(contacts.points), noise, largest)
+    cloud = _Cloud(contacts, cKDTree(contacts.points), graph_of(contacts.links), noise, largest)
     yield 0.0
     radius, fit_noise = yield from cloud.least_radius_and_noise(radius)
     cloud = cloud._replace(noise=fit_noise)
@@ -127,7 +127,7 @@ def _judged(
     limit = MOST_OFF * float(np.ptp(contacts.points, axis=0).max())
     off_enclosed = partial(_off_enclosed, atlas, cloud, limit)
     between, spots, alike = yield from chunked(off_enclosed, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
-    worst, widest = _largest_cluster(far, distances, contacts.links), np.argsort(-between, kind="stable")
+    worst, widest = _largest_cluster(far, distances, cloud.graph), np.argsort(-between, kind="stable")
     surface = list(beyond("noise", fit_noise, most))
     if not atlas.uncovered and atlas.reference.indicator.values[0, 0, 0] > 0.0:  # It is inside there.
         surface.append(Doubt("cavity"))
@@ -296,11 +296,11 @@ def _off_enclosed(
     return np.maximum(away, np.abs(off)), where, nearest
 
 
-def _largest_cluster(far: NDArray[np.bool_], distances: Array, links: Indices) -> Indices:
+def _largest_cluster(far: NDArray[np.bool_], distances: Array, graph: Any) -> Indices:
     """The indices (k,) of most of those contacts (n,) that are side by side and off, the farthest first."""
-    i, k = np.nonzero(far[:, None] & far[links])
-    _, piece = connected_pieces(i, links[i, k], len(far))
-    cluster = np.flatnonzero(far & (piece == np.bincount(piece[far], minlength=1).argmax()))
+    off = np.flatnonzero(far)
+    pieces = pieces_of(graph, off)
+    cluster = off[pieces == np.bincount(pieces, minlength=1).argmax()]
     return cluster[np.argsort(-distances[cluster], kind="stable")]
 
 
@@ -339,16 +339,15 @@ def _agreement(
             f"which are off by up to {distances[far].max():.2g}, most together around "
             f"{place_text(contacts.points[worst[:1]])}."
         )
-    if noise:
-        message += f" No noise was given; that of the fit is {noise:.2g}."
-    return message
+    return message + (f" No noise was given; that of the fit is {noise:.2g}." if noise else "")
 
 
 class _Cloud(NamedTuple):
-    """Contacts, a KD-tree, the noise, and the deviation up to which patches grow."""
+    """Contacts, their KD-tree and graph of links, the noise, and the deviation up to which patches grow."""
 
     contacts: MeasuredContacts
     tree: Any
+    graph: Any
     noise: float
     largest: float | None
 
@@ -389,11 +388,8 @@ class _Cloud(NamedTuple):
         """Those contacts around contact i that face the same way and are linked with it, so of its wall."""
         near = np.array(self.tree.query_ball_point(self.contacts.points[i], radius))
         near = near[self.contacts.normals[near] @ self.contacts.normals[i] > FACING]
-        links, order = self.contacts.links[near], np.argsort(near)
-        at = order[np.minimum(np.searchsorted(near, links, sorter=order), len(near) - 1)]
-        linked = near[at] == links
-        _, piece = connected_pieces(np.nonzero(linked)[0], at[linked], len(near))
-        return near[piece == piece[np.flatnonzero(near == i)]]
+        pieces = pieces_of(self.graph, near)
+        return near[pieces == pieces[near == i]]
 
     def middle(self, i: int, radius: float) -> int:
         """The contact nearest to the mean of those around contact i that are of its wall.
@@ -468,15 +464,13 @@ class _Cloud(NamedTuple):
 
         What noise hides at each contact, such as a low step, the mean of neighbors shows.
         """
-        links, off = self.contacts.links[some], np.zeros(len(self.contacts.points))
+        links, off = self.graph[some], np.zeros(len(self.contacts.points))
         off[some] = self.distances(r, some)
         far = too_far(off, self.noise)
         if far.any():  # These pull the patch, and means around them are off, too.
-            return are_few(far[some], far[links].any(axis=1))
-        links = np.sort(links, axis=1)
-        is_first = np.diff(links, axis=1, prepend=-1) > 0  # A link may come twice.
-        sums = off[some] + np.where(is_first, off[links], 0.0).sum(axis=1)
-        return not too_far(sums, self.noise * np.sqrt(1.0 + is_first.sum(axis=1))).any()
+            return are_few(far[some], links @ far)
+        sums, counts = off[some] + links @ off, 1 + links.sum(axis=1)
+        return not too_far(sums, self.noise * np.sqrt(counts)).any()
 
     def distances(self, r: Reconstruction, some: Indices) -> Array:
         """Distances (n,) of some of the contacts from a patch, measured from its tangent planes."""

@@ -182,25 +182,22 @@ def _winding_signs(
     starts = np.flatnonzero((counts >= SMALL * n) & (counts <= (1.0 - SMALL) * n) | is_root)
     ends, counts = ends[starts], counts[starts]
     probes = np.random.default_rng(0).permutation(n)[:PROBES]
-    numbers = np.zeros((len(probes), len(starts)))
+    parts, signs = np.zeros((len(probes), n + 1)), np.ones(n)
     for k, at in enumerate(probes):
         off = points - points[at]
         away = np.maximum(np.linalg.norm(off, axis=1), np.sqrt(areas[at]))
-        total = np.append(0.0, np.cumsum(areas * row_dot(off, normals) / away**3)) / (4.0 * np.pi)
-        numbers[k] = total[ends] - total[starts]
-    least, signs = np.maximum(CLEAR * np.minimum(counts, n - counts) / n, 1e-9), np.ones(n)
+        parts[k, 1:] = areas * row_dot(off, normals) / (4.0 * np.pi * away**3)
+    least = np.maximum(CLEAR * np.minimum(counts, n - counts) / n, 1e-9)
     while True:
-        total = numbers[:, :1]
+        sums = np.cumsum(parts, axis=1)
+        total, numbers = sums[:, -1:], sums[:, ends] - sums[:, starts]
         falls = _off_half(total) - _off_half(total - 2.0 * numbers)
-        falls[falls < least] = 0.0
-        best = np.argmax(falls)
-        if not falls[best]:
+        best = np.argmax(np.where(falls < least, 0.0, falls))
+        if falls[best] < least[best]:
             return signs * np.copysign(1.0, total.mean()), float(abs(total.mean()))
-        is_in = (starts >= starts[best]) & (ends <= ends[best])
-        is_around = (starts <= starts[best]) & (ends >= ends[best]) & ~is_in
-        numbers[:, is_around] -= 2.0 * numbers[:, [best]]
-        numbers[:, is_in] *= -1.0
-        signs[starts[best] : ends[best]] *= -1.0
+        some = slice(starts[best], ends[best])
+        signs[some] *= -1.0
+        parts[:, 1:][:, some] *= -1.0
 
 
 def _off_half(numbers: Array) -> Array:
