@@ -12,8 +12,8 @@ from scipy.spatial import cKDTree
 
 import core
 from core.atlas import measured
-from core.atlas.connectivity import graph_of
 from core.atlas.charts import AZIMUTHS
+from core.atlas.connectivity import graph_of
 from tests import solids
 
 
