@@ -33,7 +33,7 @@ from .unfelt import place_at, uncovered_places
 
 # python -m benchmarks.robot judges these.
 FEWEST = 40  # The smallest patch has this many contacts.
-SOME_PLACES = 24  # The number of places at which it is tried how large a patch has to be.
+SOME_PLACES = 24  # The number of places at which patches show the noise.
 WIDENING, WIDENINGS = 1.4, 10  # Patches grow by this factor, at most this often.
 # A patch is looked for at contacts that are farther than the first share of its radius from the middles of
 # others, or farther out on them than the second. Where there is none, none is looked for as near as that:
@@ -44,8 +44,7 @@ PATCHES_APART, COVERED = 0.6, 1.0
 AT_EDGE = 0.45  # contacts has a spike of a twentieth of its size.
 RAY_PLACES, RAY_ROUNDS = 16, 2  # The places on each ray at which a patch may end, and the rounds of these.
 ABREAST = 8  # Of this many neighbors the normals are to face the same way, or one is taken that does.
-SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
-OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
+OPPOSITE = 0.05  # Normals are refused if more than this share of neighbors face opposite ways in one place.
 # A ball is too large if neighbors below its centers lie the other way by more than this share of their
 # distance, for more than this share of links, at more than this share of centers; edges have up to a ninth.
 TURNED = 0.25
@@ -100,11 +99,13 @@ def cover_contacts(
 
     largest = None if tolerance is None else number("tolerance", tolerance, above=0.0)
     noise = None if noise is None else number("noise", noise, least=0.0)
-    felt, noise, radius = _felt(contours_or_strokes, noise, largest)
+    felt, noise = _felt(contours_or_strokes, noise, largest)
     contacts, doubts = _contacts(*felt, outward, noise)
-    cloud = _Cloud(contacts, cKDTree(contacts.points), graph_of(contacts.links), noise, largest)
+    tree = cKDTree(contacts.points)
+    radius = _least_radius(contacts, tree)
+    cloud = _Cloud(contacts, tree, graph_of(contacts.links), noise, largest)
     yield 0.0
-    radius, fit_noise = yield from cloud.least_radius_and_noise(radius)
+    fit_noise = noise or cloud.fit_noise(radius)
     cloud = cloud._replace(noise=fit_noise)
     patches, charts = yield from _patches(cloud, radius)
     reference = yield from part_of(joined_surface(patches, charts, largest, contacts.off), 1.0, 1.0)
@@ -147,10 +148,10 @@ def _judged(
 
 def _felt(
     given: Sequence[ArrayLike | Contour], noise: float | None, tolerance: float | None
-) -> tuple[tuple[Array, Array, Array], float, float]:
-    """The arguments of `_contacts`: all contacts, each once; their noise, and the least radius of a patch.
+) -> tuple[tuple[Array, Array, Array], float]:
+    """The arguments of `_contacts`, all contacts, each once; and their noise.
 
-    Raises ValueError for contacts that are too few or too near, and for a noise or a tolerance that is large.
+    Raises ValueError for contacts that are too few, and for a noise or a tolerance that is large.
     """
     curves = [
         curve if isinstance(curve, Contour) else Contour(curve)  # type: ignore[arg-type]
@@ -160,8 +161,17 @@ def _felt(
     order, starts = equal_points(points)
     once = np.sort(order[starts])
     points = points[once]
-    radius = _least_radius(points)
+    if len(points) < FEWEST:
+        raise ValueError(
+            f"contacts: expected {FEWEST} or more at different places, got {len(points)}: feel more of the "
+            "object, or reconstruct a single patch from curves through a point"
+        )
     size = float(np.ptp(points, axis=0).max())
+    if size < FEWEST * SMALLEST:
+        raise ValueError(
+            f"contacts: expected them at least {SMALLEST:g} apart, got nearer ones: use another unit of "
+            "length"
+        )
     noise = max(curve.noise or 0.0 for curve in curves) if noise is None else noise
     if noise > size:
         raise ValueError(f"noise: expected less than the size of what was felt, {size:.3g}, got {noise:.3g}")
@@ -171,7 +181,7 @@ def _felt(
         )
     balls = np.repeat([curve.ball or 0.0 for curve in curves], [len(curve.points) for curve in curves])
     normals = [0.0 * c.points + np.nan if c.normals is None else c.normals for c in curves]
-    return (points, np.vstack(normals)[once], balls[once]), noise, radius
+    return (points, np.vstack(normals)[once], balls[once]), noise
 
 
 def _contacts(
@@ -187,9 +197,12 @@ def _contacts(
     normals[known] = unit_vectors("normals", normals[known])
     if not known.all():
         normals[~known] = oriented(points, planes, np.where(known[:, None], normals, 0.0), up)[~known]
-    else:
-        _require_one_side(points, normals, planes.links)
     doubts = list(doubts_of(points, normals, planes))
+    if known.all() and any(doubt.code == "opposed" and doubt.value > OPPOSITE for doubt in doubts):
+        raise ValueError(
+            "normals: expected those of neighboring contacts on one side, got opposite ones around "
+            f"{doubts[0].words[0]}: turn all outward"
+        )
     normals[~known] = sharpened(points, normals, planes)[~known]
     if balls.any():
         centers, points = points, points - balls[:, None] * normals
@@ -198,49 +211,17 @@ def _contacts(
     return MeasuredContacts(points, normals, planes.reach, planes.links), doubts
 
 
-def _least_radius(points: Array) -> float:
-    """The radius of the smallest patches of points (n, 3), which have FEWEST of them.
+def _least_radius(contacts: MeasuredContacts, tree: Any) -> float:
+    """The radius of the smallest patches, which have FEWEST contacts, and more where these lie in lines.
 
-    Raises ValueError if there are fewer, or numbers do not hold such patches.
+    Raises ValueError if numbers do not hold such patches.
     """
-    from scipy.spatial import cKDTree
-
-    if len(points) < FEWEST:
-        raise ValueError(
-            f"contacts: expected {FEWEST} or more at different places, got {len(points)}: feel more of the "
-            "object, or reconstruct a single patch from curves through a point"
-        )
-    some = points[np.linspace(0, len(points) - 1, SOME_PLACES).astype(np.intp)]
-    radius = float(np.median(cKDTree(points).query(some, FEWEST)[0][:, -1]))
-    if radius < SMALLEST:
-        raise ValueError(
-            f"contacts: expected them at least {SMALLEST:g} apart, got nearer ones: use another unit of "
-            "length"
-        )
-    gap = float(np.spacing(np.abs(points).max()))
+    some = contacts.points[np.linspace(0, len(contacts.points) - 1, SOME_PLACES).astype(np.intp)]
+    radius = float(max(np.median(tree.query(some, FEWEST)[0][:, -1]), np.median(contacts.reach)))
+    gap = float(np.spacing(np.abs(contacts.points).max()))
     if gap > TOUCH_ROUNDING * radius:
         raise too_coarse(gap, radius)
     return radius
-
-
-def _require_one_side(points: Array, normals: Array, links: Indices) -> None:
-    """Raises ValueError if many measured normals (n, 3) of linked points (n, 3) face opposite ways.
-
-    For points p1 and p2 of a sphere with normals n1 and n2, (n1 + n2) . (p2 - p1) = 0, and nearly so on any
-    smooth surface. If n2 has the wrong sign, (n1 - n2) . (p2 - p1) is as small. For the two sides of a wall,
-    which rightly face opposite ways, it is twice the thickness.
-    """
-    chords, others = points[links] - points[:, None], normals[links]
-    facing = np.einsum("nki,ni->nk", others, normals)
-    sums = normals[:, None] + np.copysign(1.0, facing)[..., None] * others
-    apart = np.abs(row_dot(chords, sums))
-    usual = np.median(apart[facing > FACING]) if (facing > FACING).any() else 0.0
-    wrong = (facing < -FACING) & (apart <= SAME_PLACE * usual)
-    if wrong.mean() > OPPOSITE:
-        raise ValueError(
-            "normals: expected those of neighboring contacts on one side, got opposite ones at "
-            f"{np.count_nonzero(wrong.any(axis=1))} of {len(wrong)} contacts: turn all outward"
-        )
 
 
 def _beyond_bend(centers: Array, contacts: Array, links: Indices) -> Iterator[Doubt]:
@@ -478,27 +459,21 @@ class _Cloud(NamedTuple):
         surface = r.geometry.derivatives(x, y)
         return np.asarray(surface.normal[:, 2] * (z - surface.z))
 
-    def least_radius_and_noise(self, radius: float) -> Generator[float, None, tuple[float, float]]:
-        """The least radius at which patches exist at half of some places, for contacts may lie in lines.
+    def fit_noise(self, radius: float) -> float:
+        """The deviation of contacts from patches of this radius at some places, at least MISFIT of it.
 
-        Also the noise: if none was given, it is the deviation of contacts from these patches, at least MISFIT
-        of their radius. Raises ValueError if there are none. Yields 0 after each trial.
-
-        radius : the first that is tried
+        Raises ValueError if there are none.
         """
         points = self.contacts.points
         some = np.linspace(0, len(points) - 1, SOME_PLACES).astype(np.intp).tolist()
-        for _ in range(WIDENINGS):
-            patches = [(i, r) for i, r in zip(some, self.patches(some, radius), strict=True) if r is not None]
-            if len(patches) * 2 >= SOME_PLACES:
-                off = np.concatenate([self.distances(r, self.same_sheet(i, radius)) for i, r in patches])
-                return radius, self.noise or max(1.4826 * float(np.median(np.abs(off))), MISFIT * radius)
-            radius *= WIDENING
-            yield 0.0
-        raise ValueError(
-            f"contacts: expected others all around at least one of them, got {len(points)} without: make "
-            "strokes nearer to each other"
-        )
+        patches = [(i, r) for i, r in zip(some, self.patches(some, radius), strict=True) if r is not None]
+        if not patches:
+            raise ValueError(
+                f"contacts: expected others all around at least one of them, got {len(points)} without: make "
+                "strokes nearer to each other"
+            )
+        off = np.concatenate([self.distances(r, self.same_sheet(i, radius)) for i, r in patches])
+        return max(1.4826 * float(np.median(np.abs(off))), MISFIT * radius)
 
 
 def _patches(cloud: _Cloud, radius: float) -> Generator[float, None, tuple[list[Reconstruction], Charts]]:
