@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import SMALLEST, Array, list_of, number, unit_vector, unit_vectors
 from ..bayes.joint_fit import MISFIT
-from ..contours.contour import Contour, equal_points
+from ..contours.contour import Contour
 from ..patch.monge import QUADRIC
 from ..reconstruction.explained import FEW, are_few, too_far
 from ..reconstruction.from_contours import reconstruct_many
@@ -158,8 +158,7 @@ def _felt(
         for curve in list_of("contours_or_strokes", given, object)  # type: ignore[arg-type]
     ]
     points = np.vstack([np.empty((0, 3)), *(curve.points for curve in curves)])
-    order, starts = equal_points(points)
-    once = np.sort(order[starts])
+    once = np.sort(np.unique(points, axis=0, return_index=True)[1])
     points = points[once]
     if len(points) < FEWEST:
         raise ValueError(
