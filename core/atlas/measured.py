@@ -102,11 +102,17 @@ def cover_contacts(
     felt, noise = _felt(contours_or_strokes, noise, largest)
     contacts, doubts = _contacts(*felt, outward, noise)
     tree = cKDTree(contacts.points)
-    radius = _least_radius(contacts, tree)
+    some = np.linspace(0, len(contacts.points) - 1, SOME_PLACES).astype(np.intp)
+    # The smallest patches have FEWEST contacts, and more where these lie in lines.
+    fewest = np.median(tree.query(contacts.points[some], FEWEST)[0][:, -1])
+    radius = max(float(fewest), float(np.median(contacts.reach)))
+    gap = float(np.spacing(np.abs(contacts.points).max()))
+    if gap > TOUCH_ROUNDING * radius:
+        raise too_coarse(gap, radius)
     cloud = _Cloud(contacts, tree, graph_of(contacts.links), noise, largest)
     yield 0.0
-    fit_noise = noise or cloud.fit_noise(radius)
-    cloud = cloud._replace(noise=fit_noise)
+    fit_noise = cloud.fit_noise(some.tolist(), radius)
+    cloud = cloud._replace(noise=noise or fit_noise)
     patches, charts = yield from _patches(cloud, radius)
     reference = yield from part_of(joined_surface(patches, charts, largest, contacts.off), 1.0, 1.0)
     uncovered = uncovered_places(reference, charts)
@@ -132,16 +138,17 @@ def _judged(
     surface = list(beyond("noise", fit_noise, most))
     if not atlas.uncovered and atlas.reference.indicator.values[0, 0, 0] > 0.0:  # It is inside there.
         surface.append(Doubt("cavity"))
-    off = _doubts_of_contacts(contacts, distances, far, worst, is_turned, limit)
+    off, agreement = _agreement(contacts, distances, far, worst, is_turned, limit, fit_noise)
     gaps = widest[:0] if atlas.uncovered else widest[between[widest] > limit]
     sparse = [Doubt("sparse", between[i], limit, (place_text(spots[[i]]),)) for i in gaps[:1]]
     # A finger may miss the first of these, so others follow.
-    places = [(contacts.points[i], contacts.normals[i]) for i in worst[: len(off)]]
-    places += [(spots[i], contacts.normals[alike[i]]) for i in gaps]
+    places = [(contacts.points[i], contacts.normals[i]) for i in worst[: len(off)]] + [
+        (spots[i], contacts.normals[alike[i]]) for i in gaps
+    ]
     return replace(
         atlas,
         contradictions=(*doubts, *surface, *off, *sparse),
-        agreement=_agreement(contacts, distances, far, worst, fit_noise),
+        agreement=agreement,
         unexplained=tuple(place_at(*place, radius) for place in places),
     )
 
@@ -196,8 +203,8 @@ def _contacts(
     normals[known] = unit_vectors("normals", normals[known])
     if not known.all():
         normals[~known] = oriented(points, planes, np.where(known[:, None], normals, 0.0), up)[~known]
-    doubts = list(doubts_of(points, normals, planes))
-    if known.all() and any(doubt.code == "opposed" and doubt.value > OPPOSITE for doubt in doubts):
+    doubts = list(doubts_of(points, normals, planes.links))
+    if known.all() and doubts and doubts[0].value > OPPOSITE:
         raise ValueError(
             "normals: expected those of neighboring contacts on one side, got opposite ones around "
             f"{doubts[0].words[0]}: turn all outward"
@@ -208,19 +215,6 @@ def _contacts(
         doubts += _beyond_bend(centers, points, planes.links)
         planes = planes_of(points, noise)
     return MeasuredContacts(points, normals, planes.reach, planes.links), doubts
-
-
-def _least_radius(contacts: MeasuredContacts, tree: Any) -> float:
-    """The radius of the smallest patches, which have FEWEST contacts, and more where these lie in lines.
-
-    Raises ValueError if numbers do not hold such patches.
-    """
-    some = contacts.points[np.linspace(0, len(contacts.points) - 1, SOME_PLACES).astype(np.intp)]
-    radius = float(max(np.median(tree.query(some, FEWEST)[0][:, -1]), np.median(contacts.reach)))
-    gap = float(np.spacing(np.abs(contacts.points).max()))
-    if gap > TOUCH_ROUNDING * radius:
-        raise too_coarse(gap, radius)
-    return radius
 
 
 def _beyond_bend(centers: Array, contacts: Array, links: Indices) -> Iterator[Doubt]:
@@ -284,42 +278,34 @@ def _largest_cluster(far: NDArray[np.bool_], distances: Array, graph: Any) -> In
     return cluster[np.argsort(-distances[cluster], kind="stable")]
 
 
-def _doubts_of_contacts(
+def _agreement(
     contacts: MeasuredContacts,
     distances: Array,
     far: NDArray[np.bool_],
     worst: Indices,
     is_turned: NDArray[np.bool_],
     limit: float,
-) -> list[Doubt]:
+    noise: float,
+) -> tuple[list[Doubt], str]:
     """Whether more than a few contacts (n,) are far off the surface, given the worst cluster of them (k,).
 
     Few may be off up to the limit, as at sharp edges. But more side by side than a quadric has coefficients
-    show a shape.
+    show a shape. Also how contacts agree if there is no doubt.
+
+    noise : that of the fit, or 0 if one was given
     """
-    if not far.any() or (far.mean() <= FEW and len(worst) <= len(QUADRIC) and distances[far].max() <= limit):
-        return []
-    words = f"{np.count_nonzero(far)} of {len(far)} contacts", place_text(contacts.points[worst[:1]])
-    code = "confused" if is_turned[worst].any() else "off_surface"
-    return [Doubt(code, float(distances[far].max()), words=words)]
-
-
-def _agreement(
-    contacts: MeasuredContacts,
-    distances: Array,
-    far: NDArray[np.bool_],
-    worst: Indices,
-    noise: float,
-) -> str:
-    """How contacts (n,) agree with the surface if there is no doubt; `noise` is that of the fit, or 0."""
-    message = "The surface is closed, and all contacts agree with it."
-    if far.any():
-        message = (
-            f"The surface is closed. All but {np.count_nonzero(far)} of {len(far)} contacts agree with it, "
-            f"which are off by up to {distances[far].max():.2g}, most together around "
-            f"{place_text(contacts.points[worst[:1]])}."
-        )
-    return message + (f" No noise was given; that of the fit is {noise:.2g}." if noise else "")
+    noise_text = f" No noise was given; that of the fit is {noise:.2g}." if noise else ""
+    if not far.any():
+        return [], f"The surface is closed, and all contacts agree with it.{noise_text}"
+    place = place_text(contacts.points[worst[:1]])
+    count, most = np.count_nonzero(far), float(distances[far].max())
+    if far.mean() > FEW or len(worst) > len(QUADRIC) or most > limit:
+        code = "confused" if is_turned[worst].any() else "off_surface"
+        return [Doubt(code, most, words=(f"{count} of {len(far)} contacts", place))], ""
+    return [], (
+        f"The surface is closed. All but {count} of {len(far)} contacts agree with it, which are off by up "
+        f"to {most:.2g}, most together around {place}.{noise_text}"
+    )
 
 
 class _Cloud(NamedTuple):
@@ -458,18 +444,16 @@ class _Cloud(NamedTuple):
         surface = r.geometry.derivatives(x, y)
         return np.asarray(surface.normal[:, 2] * (z - surface.z))
 
-    def fit_noise(self, radius: float) -> float:
-        """The deviation of contacts from patches of this radius at some places, at least MISFIT of it.
+    def fit_noise(self, some: list[int], radius: float) -> float:
+        """The deviation of contacts from patches of this radius at some of them, at least MISFIT of it.
 
         Raises ValueError if there are none.
         """
-        points = self.contacts.points
-        some = np.linspace(0, len(points) - 1, SOME_PLACES).astype(np.intp).tolist()
         patches = [(i, r) for i, r in zip(some, self.patches(some, radius), strict=True) if r is not None]
         if not patches:
             raise ValueError(
-                f"contacts: expected others all around at least one of them, got {len(points)} without: make "
-                "strokes nearer to each other"
+                "contacts: expected others all around at least one of them, got "
+                f"{len(self.contacts.points)} without: make strokes nearer to each other"
             )
         off = np.concatenate([self.distances(r, self.same_sheet(i, radius)) for i, r in patches])
         return max(1.4826 * float(np.median(np.abs(off))), MISFIT * radius)
