@@ -102,7 +102,7 @@ def test_measured_normals_decide_before_a_hint():
 
 
 def test_strokes_that_are_too_far_apart_for_a_wall_are_a_doubt_that_names_a_place():
-    atlas = core.atlas_of([*sphere(1.0, 0.25), *sphere(0.8, 0.25)], noise=0.05)
+    atlas = core.atlas_of([*sphere(1.0, 0.4), *sphere(0.8, 0.4)], noise=0.05)
     assert atlas.doubts[0].code in ("opposed", "confused")
     assert re.search(
         r"(most together|each other) around \(.*\).* strokes are (too far|farther) apart", atlas.message
