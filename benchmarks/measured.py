@@ -331,7 +331,7 @@ def outward(points, normals):
         found = oriented(points, planes)
     except ValueError as error:
         return np.nan, f"refused: {error}"
-    doubt = next(doubts_of(points, found, planes), None)
+    doubt = next(doubts_of(points, found, planes.links), None)
     return np.mean(np.einsum("ni,ni->n", found, normals) > 0.0), doubt
 
 

@@ -132,18 +132,13 @@ REASONS = {
         "Normals contradict each other around {0}: strokes are too far apart there, or normals are wrong",
         ("make strokes nearer to each other there", "leave the normals out"),
     ),
-    "sides": Reason(
-        "Strokes around {0} are farther apart than half the thickness of the wall or gap there, so its sides "
-        "may be confused",
-        ("make strokes nearer to each other", "measure normals"),
-    ),
     "ball": Reason(
         "Centers around {0} bend more than a ball of this radius can",
         ("give the radius of the ball", "use a smaller one"),
     ),
     "noise": Reason(
         "Contacts scatter by {value:.2g} about the smallest patches, and no noise was given",
-        ("give it", "check whether files or strokes are off each other"),
+        ("give it", "check whether files or strokes are off each other", "make strokes nearer to each other"),
     ),
     "cavity": Reason(
         "Normals point inward all around, so the contacts surround a cavity",

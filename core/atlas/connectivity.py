@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Edges of triangles, and what is connected by edges."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,6 +28,22 @@ def connected_pieces(i: Indices, j: Indices, count: int) -> tuple[int, Indices]:
     from scipy.sparse.csgraph import connected_components
 
     return connected_components(coo_matrix((np.ones(len(i)), (i, j)), (count, count)), directed=False)
+
+
+def graph_of(links: Indices) -> Any:
+    """The sparse matrix (n, n) of bool whose row i has the nodes links[i], of (n, k), each once."""
+    from scipy.sparse import coo_array
+
+    n, k = links.shape
+    return coo_array((np.ones(n * k, dtype=bool), (np.arange(n).repeat(k), links.ravel())), (n, n)).tocsr()
+
+
+def pieces_of(graph: Any, some: Indices) -> Indices:
+    """The connected component (m,) of each of some nodes of a graph, by the links between these alone."""
+    from scipy.sparse.csgraph import connected_components
+
+    pieces: Indices = connected_components(graph[some][:, some], directed=False)[1]
+    return pieces
 
 
 def split_sides(triangles: Indices, sides: Indices, new: int) -> Indices:

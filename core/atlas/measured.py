@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import SMALLEST, Array, list_of, number, unit_vector, unit_vectors
 from ..bayes.joint_fit import MISFIT
-from ..contours.contour import Contour, equal_points
+from ..contours.contour import Contour
 from ..patch.monge import QUADRIC
 from ..reconstruction.explained import FEW, are_few, too_far
 from ..reconstruction.from_contours import reconstruct_many
@@ -22,7 +22,7 @@ from ..steps import chunked, part_of, result_of
 from ..triangles import row_dot
 from ..verdict import Doubt, beyond
 from .charts import AZIMUTHS, Charts
-from .connectivity import Indices, connected_pieces
+from .connectivity import Indices, graph_of, pieces_of
 from .field import AGREE, INSIDE, sheet_facing
 from .finger import FACING
 from .join import stacked, tabulate
@@ -33,7 +33,7 @@ from .unfelt import place_at, uncovered_places
 
 # python -m benchmarks.robot judges these.
 FEWEST = 40  # The smallest patch has this many contacts.
-SOME_PLACES = 24  # The number of places at which it is tried how large a patch has to be.
+SOME_PLACES = 24  # The number of places at which patches show the noise.
 WIDENING, WIDENINGS = 1.4, 10  # Patches grow by this factor, at most this often.
 # A patch is looked for at contacts that are farther than the first share of its radius from the middles of
 # others, or farther out on them than the second. Where there is none, none is looked for as near as that:
@@ -44,8 +44,7 @@ PATCHES_APART, COVERED = 0.6, 1.0
 AT_EDGE = 0.45  # contacts has a spike of a twentieth of its size.
 RAY_PLACES, RAY_ROUNDS = 16, 2  # The places on each ray at which a patch may end, and the rounds of these.
 ABREAST = 8  # Of this many neighbors the normals are to face the same way, or one is taken that does.
-SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
-OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
+OPPOSITE = 0.05  # Normals are refused if more than this share of neighbors face opposite ways in one place.
 # A ball is too large if neighbors below its centers lie the other way by more than this share of their
 # distance, for more than this share of links, at more than this share of centers; edges have up to a ninth.
 TURNED = 0.25
@@ -100,12 +99,20 @@ def cover_contacts(
 
     largest = None if tolerance is None else number("tolerance", tolerance, above=0.0)
     noise = None if noise is None else number("noise", noise, least=0.0)
-    felt, noise, radius = _felt(contours_or_strokes, noise, largest)
+    felt, noise = _felt(contours_or_strokes, noise, largest)
     contacts, doubts = _contacts(*felt, outward, noise)
-    cloud = _Cloud(contacts, cKDTree(contacts.points), noise, largest)
+    tree = cKDTree(contacts.points)
+    some = np.linspace(0, len(contacts.points) - 1, SOME_PLACES).astype(np.intp)
+    # The smallest patches have FEWEST contacts, and more where these lie in lines.
+    fewest = np.median(tree.query(contacts.points[some], FEWEST)[0][:, -1])
+    radius = max(float(fewest), float(np.median(contacts.reach)))
+    gap = float(np.spacing(np.abs(contacts.points).max()))
+    if gap > TOUCH_ROUNDING * radius:
+        raise too_coarse(gap, radius)
+    cloud = _Cloud(contacts, tree, graph_of(contacts.links), noise, largest)
     yield 0.0
-    radius, fit_noise = yield from cloud.least_radius_and_noise(radius)
-    cloud = cloud._replace(noise=fit_noise)
+    fit_noise = cloud.fit_noise(some.tolist(), radius)
+    cloud = cloud._replace(noise=noise or fit_noise)
     patches, charts = yield from _patches(cloud, radius)
     reference = yield from part_of(joined_surface(patches, charts, largest, contacts.off), 1.0, 1.0)
     uncovered = uncovered_places(reference, charts)
@@ -127,41 +134,50 @@ def _judged(
     limit = MOST_OFF * float(np.ptp(contacts.points, axis=0).max())
     off_enclosed = partial(_off_enclosed, atlas, cloud, limit)
     between, spots, alike = yield from chunked(off_enclosed, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
-    worst, widest = _largest_cluster(far, distances, contacts.links), np.argsort(-between, kind="stable")
+    worst, widest = _largest_cluster(far, distances, cloud.graph), np.argsort(-between, kind="stable")
     surface = list(beyond("noise", fit_noise, most))
     if not atlas.uncovered and atlas.reference.indicator.values[0, 0, 0] > 0.0:  # It is inside there.
         surface.append(Doubt("cavity"))
-    off = _doubts_of_contacts(contacts, distances, far, worst, is_turned, limit)
+    off, agreement = _agreement(contacts, distances, far, worst, is_turned, limit, fit_noise)
     gaps = widest[:0] if atlas.uncovered else widest[between[widest] > limit]
     sparse = [Doubt("sparse", between[i], limit, (place_text(spots[[i]]),)) for i in gaps[:1]]
     # A finger may miss the first of these, so others follow.
-    places = [(contacts.points[i], contacts.normals[i]) for i in worst[: len(off)]]
-    places += [(spots[i], contacts.normals[alike[i]]) for i in gaps]
+    places = [(contacts.points[i], contacts.normals[i]) for i in worst[: len(off)]] + [
+        (spots[i], contacts.normals[alike[i]]) for i in gaps
+    ]
     return replace(
         atlas,
         contradictions=(*doubts, *surface, *off, *sparse),
-        agreement=_agreement(contacts, distances, far, worst, fit_noise),
+        agreement=agreement,
         unexplained=tuple(place_at(*place, radius) for place in places),
     )
 
 
 def _felt(
     given: Sequence[ArrayLike | Contour], noise: float | None, tolerance: float | None
-) -> tuple[tuple[Array, Array, Array], float, float]:
-    """The arguments of `_contacts`: all contacts, each once; their noise, and the least radius of a patch.
+) -> tuple[tuple[Array, Array, Array], float]:
+    """The arguments of `_contacts`, all contacts, each once; and their noise.
 
-    Raises ValueError for contacts that are too few or too near, and for a noise or a tolerance that is large.
+    Raises ValueError for contacts that are too few, and for a noise or a tolerance that is large.
     """
     curves = [
         curve if isinstance(curve, Contour) else Contour(curve)  # type: ignore[arg-type]
         for curve in list_of("contours_or_strokes", given, object)  # type: ignore[arg-type]
     ]
     points = np.vstack([np.empty((0, 3)), *(curve.points for curve in curves)])
-    order, starts = equal_points(points)
-    once = np.sort(order[starts])
+    once = np.sort(np.unique(points, axis=0, return_index=True)[1])
     points = points[once]
-    radius = _least_radius(points)
+    if len(points) < FEWEST:
+        raise ValueError(
+            f"contacts: expected {FEWEST} or more at different places, got {len(points)}: feel more of the "
+            "object, or reconstruct a single patch from curves through a point"
+        )
     size = float(np.ptp(points, axis=0).max())
+    if size < FEWEST * SMALLEST:
+        raise ValueError(
+            f"contacts: expected them at least {SMALLEST:g} apart, got nearer ones: use another unit of "
+            "length"
+        )
     noise = max(curve.noise or 0.0 for curve in curves) if noise is None else noise
     if noise > size:
         raise ValueError(f"noise: expected less than the size of what was felt, {size:.3g}, got {noise:.3g}")
@@ -171,7 +187,7 @@ def _felt(
         )
     balls = np.repeat([curve.ball or 0.0 for curve in curves], [len(curve.points) for curve in curves])
     normals = [0.0 * c.points + np.nan if c.normals is None else c.normals for c in curves]
-    return (points, np.vstack(normals)[once], balls[once]), noise, radius
+    return (points, np.vstack(normals)[once], balls[once]), noise
 
 
 def _contacts(
@@ -187,60 +203,18 @@ def _contacts(
     normals[known] = unit_vectors("normals", normals[known])
     if not known.all():
         normals[~known] = oriented(points, planes, np.where(known[:, None], normals, 0.0), up)[~known]
-    else:
-        _require_one_side(points, normals, planes.links)
-    doubts = list(doubts_of(points, normals, planes))
+    doubts = list(doubts_of(points, normals, planes.links))
+    if known.all() and doubts and doubts[0].value > OPPOSITE:
+        raise ValueError(
+            "normals: expected those of neighboring contacts on one side, got opposite ones around "
+            f"{doubts[0].words[0]}: turn all outward"
+        )
     normals[~known] = sharpened(points, normals, planes)[~known]
     if balls.any():
         centers, points = points, points - balls[:, None] * normals
         doubts += _beyond_bend(centers, points, planes.links)
         planes = planes_of(points, noise)
     return MeasuredContacts(points, normals, planes.reach, planes.links), doubts
-
-
-def _least_radius(points: Array) -> float:
-    """The radius of the smallest patches of points (n, 3), which have FEWEST of them.
-
-    Raises ValueError if there are fewer, or numbers do not hold such patches.
-    """
-    from scipy.spatial import cKDTree
-
-    if len(points) < FEWEST:
-        raise ValueError(
-            f"contacts: expected {FEWEST} or more at different places, got {len(points)}: feel more of the "
-            "object, or reconstruct a single patch from curves through a point"
-        )
-    some = points[np.linspace(0, len(points) - 1, SOME_PLACES).astype(np.intp)]
-    radius = float(np.median(cKDTree(points).query(some, FEWEST)[0][:, -1]))
-    if radius < SMALLEST:
-        raise ValueError(
-            f"contacts: expected them at least {SMALLEST:g} apart, got nearer ones: use another unit of "
-            "length"
-        )
-    gap = float(np.spacing(np.abs(points).max()))
-    if gap > TOUCH_ROUNDING * radius:
-        raise too_coarse(gap, radius)
-    return radius
-
-
-def _require_one_side(points: Array, normals: Array, links: Indices) -> None:
-    """Raises ValueError if many measured normals (n, 3) of linked points (n, 3) face opposite ways.
-
-    For points p1 and p2 of a sphere with normals n1 and n2, (n1 + n2) . (p2 - p1) = 0, and nearly so on any
-    smooth surface. If n2 has the wrong sign, (n1 - n2) . (p2 - p1) is as small. For the two sides of a wall,
-    which rightly face opposite ways, it is twice the thickness.
-    """
-    chords, others = points[links] - points[:, None], normals[links]
-    facing = np.einsum("nki,ni->nk", others, normals)
-    sums = normals[:, None] + np.copysign(1.0, facing)[..., None] * others
-    apart = np.abs(row_dot(chords, sums))
-    usual = np.median(apart[facing > FACING]) if (facing > FACING).any() else 0.0
-    wrong = (facing < -FACING) & (apart <= SAME_PLACE * usual)
-    if wrong.mean() > OPPOSITE:
-        raise ValueError(
-            "normals: expected those of neighboring contacts on one side, got opposite ones at "
-            f"{np.count_nonzero(wrong.any(axis=1))} of {len(wrong)} contacts: turn all outward"
-        )
 
 
 def _beyond_bend(centers: Array, contacts: Array, links: Indices) -> Iterator[Doubt]:
@@ -296,32 +270,12 @@ def _off_enclosed(
     return np.maximum(away, np.abs(off)), where, nearest
 
 
-def _largest_cluster(far: NDArray[np.bool_], distances: Array, links: Indices) -> Indices:
+def _largest_cluster(far: NDArray[np.bool_], distances: Array, graph: Any) -> Indices:
     """The indices (k,) of most of those contacts (n,) that are side by side and off, the farthest first."""
-    i, k = np.nonzero(far[:, None] & far[links])
-    _, piece = connected_pieces(i, links[i, k], len(far))
-    cluster = np.flatnonzero(far & (piece == np.bincount(piece[far], minlength=1).argmax()))
+    off = np.flatnonzero(far)
+    pieces = pieces_of(graph, off)
+    cluster = off[pieces == np.bincount(pieces, minlength=1).argmax()]
     return cluster[np.argsort(-distances[cluster], kind="stable")]
-
-
-def _doubts_of_contacts(
-    contacts: MeasuredContacts,
-    distances: Array,
-    far: NDArray[np.bool_],
-    worst: Indices,
-    is_turned: NDArray[np.bool_],
-    limit: float,
-) -> list[Doubt]:
-    """Whether more than a few contacts (n,) are far off the surface, given the worst cluster of them (k,).
-
-    Few may be off up to the limit, as at sharp edges. But more side by side than a quadric has coefficients
-    show a shape.
-    """
-    if not far.any() or (far.mean() <= FEW and len(worst) <= len(QUADRIC) and distances[far].max() <= limit):
-        return []
-    words = f"{np.count_nonzero(far)} of {len(far)} contacts", place_text(contacts.points[worst[:1]])
-    code = "confused" if is_turned[worst].any() else "off_surface"
-    return [Doubt(code, float(distances[far].max()), words=words)]
 
 
 def _agreement(
@@ -329,26 +283,37 @@ def _agreement(
     distances: Array,
     far: NDArray[np.bool_],
     worst: Indices,
+    is_turned: NDArray[np.bool_],
+    limit: float,
     noise: float,
-) -> str:
-    """How contacts (n,) agree with the surface if there is no doubt; `noise` is that of the fit, or 0."""
-    message = "The surface is closed, and all contacts agree with it."
-    if far.any():
-        message = (
-            f"The surface is closed. All but {np.count_nonzero(far)} of {len(far)} contacts agree with it, "
-            f"which are off by up to {distances[far].max():.2g}, most together around "
-            f"{place_text(contacts.points[worst[:1]])}."
-        )
-    if noise:
-        message += f" No noise was given; that of the fit is {noise:.2g}."
-    return message
+) -> tuple[list[Doubt], str]:
+    """Whether more than a few contacts (n,) are far off the surface, given the worst cluster of them (k,).
+
+    Few may be off up to the limit, as at sharp edges. But more side by side than a quadric has coefficients
+    show a shape. Also how contacts agree if there is no doubt.
+
+    noise : that of the fit, or 0 if one was given
+    """
+    noise_text = f" No noise was given; that of the fit is {noise:.2g}." if noise else ""
+    if not far.any():
+        return [], f"The surface is closed, and all contacts agree with it.{noise_text}"
+    place = place_text(contacts.points[worst[:1]])
+    count, most = np.count_nonzero(far), float(distances[far].max())
+    if far.mean() > FEW or len(worst) > len(QUADRIC) or most > limit:
+        code = "confused" if is_turned[worst].any() else "off_surface"
+        return [Doubt(code, most, words=(f"{count} of {len(far)} contacts", place))], ""
+    return [], (
+        f"The surface is closed. All but {count} of {len(far)} contacts agree with it, which are off by up "
+        f"to {most:.2g}, most together around {place}.{noise_text}"
+    )
 
 
 class _Cloud(NamedTuple):
-    """Contacts, a KD-tree, the noise, and the deviation up to which patches grow."""
+    """Contacts, their KD-tree and graph of links, the noise, and the deviation up to which patches grow."""
 
     contacts: MeasuredContacts
     tree: Any
+    graph: Any
     noise: float
     largest: float | None
 
@@ -389,11 +354,8 @@ class _Cloud(NamedTuple):
         """Those contacts around contact i that face the same way and are linked with it, so of its wall."""
         near = np.array(self.tree.query_ball_point(self.contacts.points[i], radius))
         near = near[self.contacts.normals[near] @ self.contacts.normals[i] > FACING]
-        links, order = self.contacts.links[near], np.argsort(near)
-        at = order[np.minimum(np.searchsorted(near, links, sorter=order), len(near) - 1)]
-        linked = near[at] == links
-        _, piece = connected_pieces(np.nonzero(linked)[0], at[linked], len(near))
-        return near[piece == piece[np.flatnonzero(near == i)]]
+        pieces = pieces_of(self.graph, near)
+        return near[pieces == pieces[near == i]]
 
     def middle(self, i: int, radius: float) -> int:
         """The contact nearest to the mean of those around contact i that are of its wall.
@@ -468,15 +430,13 @@ class _Cloud(NamedTuple):
 
         What noise hides at each contact, such as a low step, the mean of neighbors shows.
         """
-        links, off = self.contacts.links[some], np.zeros(len(self.contacts.points))
+        links, off = self.graph[some], np.zeros(len(self.contacts.points))
         off[some] = self.distances(r, some)
         far = too_far(off, self.noise)
         if far.any():  # These pull the patch, and means around them are off, too.
-            return are_few(far[some], far[links].any(axis=1))
-        links = np.sort(links, axis=1)
-        is_first = np.diff(links, axis=1, prepend=-1) > 0  # A link may come twice.
-        sums = off[some] + np.where(is_first, off[links], 0.0).sum(axis=1)
-        return not too_far(sums, self.noise * np.sqrt(1.0 + is_first.sum(axis=1))).any()
+            return are_few(far[some], links @ far)
+        sums, counts = off[some] + links @ off, 1 + links.sum(axis=1)
+        return not too_far(sums, self.noise * np.sqrt(counts)).any()
 
     def distances(self, r: Reconstruction, some: Indices) -> Array:
         """Distances (n,) of some of the contacts from a patch, measured from its tangent planes."""
@@ -484,27 +444,19 @@ class _Cloud(NamedTuple):
         surface = r.geometry.derivatives(x, y)
         return np.asarray(surface.normal[:, 2] * (z - surface.z))
 
-    def least_radius_and_noise(self, radius: float) -> Generator[float, None, tuple[float, float]]:
-        """The least radius at which patches exist at half of some places, for contacts may lie in lines.
+    def fit_noise(self, some: list[int], radius: float) -> float:
+        """The deviation of contacts from patches of this radius at some of them, at least MISFIT of it.
 
-        Also the noise: if none was given, it is the deviation of contacts from these patches, at least MISFIT
-        of their radius. Raises ValueError if there are none. Yields 0 after each trial.
-
-        radius : the first that is tried
+        Raises ValueError if there are none.
         """
-        points = self.contacts.points
-        some = np.linspace(0, len(points) - 1, SOME_PLACES).astype(np.intp).tolist()
-        for _ in range(WIDENINGS):
-            patches = [(i, r) for i, r in zip(some, self.patches(some, radius), strict=True) if r is not None]
-            if len(patches) * 2 >= SOME_PLACES:
-                off = np.concatenate([self.distances(r, self.same_sheet(i, radius)) for i, r in patches])
-                return radius, self.noise or max(1.4826 * float(np.median(np.abs(off))), MISFIT * radius)
-            radius *= WIDENING
-            yield 0.0
-        raise ValueError(
-            f"contacts: expected others all around at least one of them, got {len(points)} without: make "
-            "strokes nearer to each other"
-        )
+        patches = [(i, r) for i, r in zip(some, self.patches(some, radius), strict=True) if r is not None]
+        if not patches:
+            raise ValueError(
+                "contacts: expected others all around at least one of them, got "
+                f"{len(self.contacts.points)} without: make strokes nearer to each other"
+            )
+        off = np.concatenate([self.distances(r, self.same_sheet(i, radius)) for i, r in patches])
+        return max(1.4826 * float(np.median(np.abs(off))), MISFIT * radius)
 
 
 def _patches(cloud: _Cloud, radius: float) -> Generator[float, None, tuple[list[Reconstruction], Charts]]:

@@ -28,10 +28,9 @@ SHARPENINGS = 3  # and is passed on from neighbor to neighbor this often.
 LINKS = 12  # A contact is linked with this many of its neighbors.
 AT_ONCE = 20_000  # This many contacts are taken at once.
 BEND = 0.1  # Links along which the surface goes on come before those around edges and across gaps.
-OPPOSED = -0.3  # A link contradicts the sides of its contacts if its cosine is less.
-DOUBTED = 0.02  # Not more contacts than this share may contradict their neighbors,
-CONFUSED = 0.05  # and not more than this share may have the other side of a wall among their neighbors.
-FACING = 0.8  # Contacts face each other across a wall if they and the way between them do by this cosine.
+SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
+DOUBTED = 0.02  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
+FACING = 0.8  # Contacts face one way, or opposite ways, if their normals do by this cosine.
 CLOSED = 0.15  # Contacts show their outer side if the mean of their winding numbers is more.
 DECISIVE = 0.3  # A hint decides if the mean cosine between it and the normals is more.
 SMALL = 0.1  # Together at least this share of the contacts is turned,
@@ -182,25 +181,24 @@ def _winding_signs(
     starts = np.flatnonzero((counts >= SMALL * n) & (counts <= (1.0 - SMALL) * n) | is_root)
     ends, counts = ends[starts], counts[starts]
     probes = np.random.default_rng(0).permutation(n)[:PROBES]
-    numbers = np.zeros((len(probes), len(starts)))
+    cuts = np.union1d(starts, ends)
+    first, last = np.searchsorted(cuts, starts), np.searchsorted(cuts, ends)
+    parts, signs = np.zeros((len(probes), len(cuts))), np.ones(n)
     for k, at in enumerate(probes):
         off = points - points[at]
         away = np.maximum(np.linalg.norm(off, axis=1), np.sqrt(areas[at]))
-        total = np.append(0.0, np.cumsum(areas * row_dot(off, normals) / away**3)) / (4.0 * np.pi)
-        numbers[k] = total[ends] - total[starts]
-    least, signs = np.maximum(CLEAR * np.minimum(counts, n - counts) / n, 1e-9), np.ones(n)
+        solid_angles = areas / away**2 * row_dot(off, normals) / away
+        parts[k, 1:] = np.add.reduceat(solid_angles, cuts[:-1]) / (4.0 * np.pi)
+    least = np.maximum(CLEAR * np.minimum(counts, n - counts) / n, 1e-9)
     while True:
-        total = numbers[:, :1]
+        sums = np.cumsum(parts, axis=1)
+        total, numbers = sums[:, -1:], sums[:, last] - sums[:, first]
         falls = _off_half(total) - _off_half(total - 2.0 * numbers)
-        falls[falls < least] = 0.0
-        best = np.argmax(falls)
-        if not falls[best]:
+        best = np.argmax(np.where(falls < least, 0.0, falls))
+        if falls[best] < least[best]:
             return signs * np.copysign(1.0, total.mean()), float(abs(total.mean()))
-        is_in = (starts >= starts[best]) & (ends <= ends[best])
-        is_around = (starts <= starts[best]) & (ends >= ends[best]) & ~is_in
-        numbers[:, is_around] -= 2.0 * numbers[:, [best]]
-        numbers[:, is_in] *= -1.0
         signs[starts[best] : ends[best]] *= -1.0
+        parts[:, first[best] + 1 : last[best] + 1] *= -1.0
 
 
 def _off_half(numbers: Array) -> Array:
@@ -229,18 +227,20 @@ def _global_sign(normals: Array, known: Array | None, up: Array | None, number: 
     return float(np.copysign(1.0, mean))
 
 
-def doubts_of(points: Array, normals: Array, planes: Planes) -> Iterator[Doubt]:
-    """Where outward normals (n, 3) of contacts are in doubt."""
-    i, j = np.repeat(np.arange(len(points)), LINKS), planes.links.ravel()
-    cosine, bend = reflection_agreement(points, normals, i, j)
-    against = np.bincount(i, cosine < OPPOSED) * 2 > LINKS
-    if against.mean() > DOUBTED:
-        yield Doubt("opposed", float(against.mean()), DOUBTED, (place_text(points[against]),))
-    # Contacts that are as near as their noise are of one wall.
-    apart = np.abs(row_dot(normals[i], points[j] - points[i])) > THROUGH * planes.rms[i]
-    walls = np.bincount(i, apart & (np.abs(row_dot(normals[i], normals[j])) > FACING) & (bend > FACING)) > 0
-    if walls.mean() > CONFUSED:
-        yield Doubt("sides", float(walls.mean()), CONFUSED, (place_text(points[walls]),))
+def doubts_of(points: Array, normals: Array, links: Indices) -> Iterator[Doubt]:
+    """Whether outward normals (n, 3) of many linked contacts (n, k) face opposite ways in one place.
+
+    For points p1 and p2 of a sphere with normals n1 and n2, (n1 + n2) . (p2 - p1) = 0, and nearly so on any
+    smooth surface. If n2 has the wrong sign, (n1 - n2) . (p2 - p1) is as small. For the two sides of a wall,
+    which rightly face opposite ways, it is twice the thickness.
+    """
+    chords, others = points[links] - points[:, None], normals[links]
+    facing = row_dot(normals[:, None], others)
+    apart = np.abs(row_dot(chords, normals[:, None] + np.copysign(1.0, facing)[..., None] * others))
+    usual = np.median(np.append(apart[facing > FACING], 0.0))
+    wrong = (facing < -FACING) & (apart <= SAME_PLACE * usual)
+    if wrong.mean() > DOUBTED:
+        yield Doubt("opposed", float(wrong.mean()), DOUBTED, (place_text(points[wrong.any(axis=1)]),))
 
 
 def place_text(points: Array) -> str:

@@ -10,13 +10,11 @@ import pytest
 import surfaces
 
 import core
-from core.atlas.orientation import doubts_of, oriented, planes_of
 from core.contours.common_point import common_point
 from core.paper import tagc
 from core.verdict import REASONS
 from tests import solids
 from tests.core.atlas.test_measured import ball, cap_rows, few_on_box, rings_of_ball, second
-from tests.core.atlas.test_orientation import sphere
 from tests.core.bayes.test_bends import fold
 from tests.core.bayes.test_measured_normals import measured, tilted, touched
 from tests.core.bayes.test_near_point import cone
@@ -176,16 +174,6 @@ def opposed():
     return [core.atlas_of([core.Contour(points, normals=some)]).doubts for some in (normals, None)]
 
 
-def sides():
-    """Strokes over two balls, one in the other, farther apart than half of their distance, and nearer."""
-    found = []
-    for gap in (0.5, 0.05):
-        points = np.vstack([*sphere(1.0, gap), *sphere(0.8, gap)])
-        planes = planes_of(points, 0.0)
-        found.append(list(doubts_of(points, oriented(points, planes), planes)))
-    return found
-
-
 def ball_():
     return [
         core.atlas_of([core.Contour(ring, ball=radius) for ring in rings_of_ball()]).doubts
@@ -265,7 +253,7 @@ OF_TOUCHES = {
     **{each.__name__.rstrip("_"): each for each in (facets, taps, near_edge, gap, condition, kink, point)},
     **{each.__name__.rstrip("_"): each for each in (normals, scattered_normals, contacts, heights)},
     **{each.__name__.rstrip("_"): each for each in (directions, curvatures, curve, waves_, flat_face)},
-    **{each.__name__.rstrip("_"): each for each in (folds, bend, mesh, steps, sides)},
+    **{each.__name__.rstrip("_"): each for each in (folds, bend, mesh, steps)},
 }
 OF_OBJECTS = {
     each.__name__.rstrip("_"): each
