@@ -15,19 +15,15 @@ they are wrong. So are those about the facets with an error below .15.
 
 With --models it touches the .obj files of a folder, as those of github:alecjacobson/common-3d-test-models, at
 twelve points each, and counts those that are sure. They are compared with their mesh under a Subdivision
-modifier, where patches of the same radius and of half of it agree. A sure one is wrong if it is off by over
-1/4, by more than .1 / L and by more than two stated deviations. A doubt about facets is right if it is off by
-more than .1 / L and two deviations that the contacts alone have: stated ones contain how far facets may be off.
-
-Those of 10,000 faces or more are touched at such points once more, decimated (Decimate modifier, Collapse), and
-compared with themselves: with the nearer of the quartic over 0.6 of the radius and the sextic over all of it
-that fit their mesh, as in benchmarks.curvatures. So nearly every place counts. Off by 1/4 are those that are
-off by more than .1 / L as well, by which two patches of one surface may differ.
+modifier, where patches of the same radius and of half of it agree. Those of 10,000 faces or more are also
+decimated (Decimate modifier, Collapse), and compared with the polynomials of benchmarks.curvatures that fit
+their own mesh there, the nearer one, so nearly all places count.
+One is off by 1/4 if it is by more than .1 / L as well, and wrong if also by more than two stated deviations.
+A doubt about facets is needed if it is off by more than .1 / L and two deviations of the contacts alone.
 """
 
 import math
 from collections import defaultdict
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from statistics import median
@@ -222,7 +218,7 @@ def of_model(found, whole, half):
 
     whole, half : touches of the subdivided mesh, or None
     """
-    r, bare = found.result, replace(found.result, shape_curvatures=np.empty((0, 2)))
+    r = found.result
     if not (whole and half):
         return False, False, False
     true, other = np.sort(curvatures(half)), np.sort(curvatures(whole))
@@ -232,7 +228,7 @@ def of_model(found, whole, half):
     return (
         is_known,
         off > max(least, WRONG * largest, WITHIN * deviation(r)),
-        off > max(least, WITHIN * deviation(bare)),
+        off > max(least, WITHIN * r.posterior.curvature_std() / r.radius),
     )
 
 
