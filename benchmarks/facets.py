@@ -15,14 +15,15 @@ they are wrong. So are those about the facets with an error below .15.
 
 With --models it touches the .obj files of a folder, as those of github:alecjacobson/common-3d-test-models, at
 twelve points each, and counts those that are sure. They are compared with their mesh under a Subdivision
-modifier, where patches of the same radius and of half of it agree. A sure one is wrong if it is off by over
-1/4, by more than .1 / L and by more than two stated deviations. A doubt about facets is right if it is off by
-more than .1 / L and two deviations that the contacts alone have.
+modifier, where patches of the same radius and of half of it agree. Those of 10,000 faces or more are also
+decimated (Decimate modifier, Collapse), and compared with the polynomials of benchmarks.curvatures that fit
+their own mesh there, the nearer one, so nearly all places count.
+One is off by 1/4 if it is by more than .1 / L as well, and wrong if also by more than two stated deviations.
+A doubt about facets is needed if it is off by more than .1 / L and two deviations of the contacts alone.
 """
 
 import math
 from collections import defaultdict
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from statistics import median
@@ -33,13 +34,16 @@ from tests.surfaces import ellipsoid
 from tools import blender
 
 from . import machine, parser_of, table
+from .curvatures import TRUTHS, true_curvatures
 from .paper import AZIMUTHS
+from .whole import Rays
 
 POINTS = 60
 TOP = 0.9999  # The lids of cylinders and cones, which are flat, are beyond this height; they are left out.
 WRONG, RIGHT = 0.25, 0.15  # Good patches with larger errors may be wrong, those of facets with smaller ones.
 WITHIN, KNOWN = 2.0, 0.1  # Deviations, and a share of 1 / L, within which a curvature is right.
 OF_MODELS, SEED, MOST_FACES = 12, 7, 600_000  # Points of a model, and faces of it when it is subdivided.
+DENSE, SHARES = 10_000, (4, 16, 64)  # Models of this many faces are decimated to these parts of them.
 FINEST, AGREE = 5, 0.15  # Suzanne's curvatures are those of these levels where two extents agree to this.
 
 
@@ -171,7 +175,9 @@ def main():
             return None
 
     if arguments.models:
-        print_models(bpy, sorted(arguments.models.glob("*.obj")), touch)
+        paths = sorted(arguments.models.glob("*.obj"))
+        print_models(bpy, paths, touch)
+        print_decimated(bpy, paths, touch)
         print(f"Seed {SEED}; {machine('bpy')}.")
         return
     errors = defaultdict(list)  # By object: (verdict, error, whether it is wrong) of each patch.
@@ -189,17 +195,22 @@ def main():
 
 
 def opened(bpy, path):
-    """The mesh of a file, and a copy of it that is subdivided."""
+    """The mesh of a file."""
     bpy.ops.wm.read_homefile(use_empty=True)
     bpy.ops.wm.obj_import(filepath=str(path))
     obj = bpy.context.view_layer.objects.active = bpy.context.selected_objects[0]
     if len(bpy.context.selected_objects) > 1:
         bpy.ops.object.join()
+    return obj
+
+
+def subdivided(bpy, obj):
+    """A copy of an object that is subdivided."""
     fine = obj.copy()
     bpy.context.collection.objects.link(fine)
     levels = math.log(MOST_FACES / (3 * len(obj.data.polygons)), 4)
     fine.modifiers.new("Subdivision", "SUBSURF").levels = min(max(int(levels), 1), 4)
-    return obj, fine
+    return fine
 
 
 def of_model(found, whole, half):
@@ -207,7 +218,7 @@ def of_model(found, whole, half):
 
     whole, half : touches of the subdivided mesh, or None
     """
-    r, bare = found.result, replace(found.result, shape_curvatures=np.empty((0, 2)))
+    r = found.result
     if not (whole and half):
         return False, False, False
     true, other = np.sort(curvatures(half)), np.sort(curvatures(whole))
@@ -217,7 +228,7 @@ def of_model(found, whole, half):
     return (
         is_known,
         off > max(least, WRONG * largest, WITHIN * deviation(r)),
-        off > max(least, WITHIN * deviation(bare)),
+        off > max(least, WITHIN * r.posterior.curvature_std() / r.radius),
     )
 
 
@@ -225,7 +236,8 @@ def print_models(bpy, paths, touch):
     rows, total = [], np.zeros(6, dtype=int)
     for path in paths:
         with blender.quiet():
-            obj, fine = opened(bpy, path)
+            obj = opened(bpy, path)
+            fine = subdivided(bpy, obj)
             counts = np.zeros(6, dtype=int)
             for place in places(obj, bpy.context.evaluated_depsgraph_get(), OF_MODELS, SEED):
                 found = touch(obj, place)
@@ -244,6 +256,64 @@ def print_models(bpy, paths, touch):
     head = ["model", "touches", "sure", "known", "wrong", "doubts about facets, known", "not needed"]
     table(head, rows)
     print(f"{total[1] / total[0]:.2f} of the touches are sure.")
+
+
+def rays_of(obj):
+    """The mesh of an object in the world, without its modifiers."""
+    mesh = obj.data
+    mesh.calc_loop_triangles()
+    points, faces = np.empty((len(mesh.vertices), 3)), np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
+    mesh.vertices.foreach_get("co", points.ravel())
+    mesh.loop_triangles.foreach_get("vertices", faces.ravel())
+    turn, shift = np.array(obj.matrix_world)[:3, :3], np.array(obj.matrix_world)[:3, 3]
+    return Rays(points @ turn.T + shift, faces)
+
+
+def decimated(bpy, path):
+    """(share, object) of a model of DENSE faces or more, with each of SHARES of them, and the rays of all."""
+    obj = opened(bpy, path)
+    if len(obj.data.polygons) < DENSE:
+        return
+    dense, fewer = rays_of(obj), obj.modifiers.new("Decimate", "DECIMATE")
+    for share in SHARES:
+        fewer.ratio = 1.0 / share
+        yield share, obj, dense
+
+
+def beside_dense(found, dense):
+    """Whether a touch is off its dense mesh, beyond two deviations as well, and within two of contacts alone.
+
+    None if no polynomial explains the mesh there.
+    """
+    r, k = found.result, np.sort(curvatures(found))
+    fits = [np.sort(true) for of in TRUTHS if (true := true_curvatures(dense, r, *of)) is not None]
+    if not fits:
+        return None
+    off, allowed = min(
+        ((np.abs(k - true).max(), max(WRONG * np.abs(true).max(), KNOWN / r.radius)) for true in fits),
+        key=lambda pair: pair[0] / pair[1],
+    )
+    alone = max(KNOWN / r.radius, WITHIN * r.posterior.curvature_std() / r.radius)
+    return off > allowed, off > max(allowed, WITHIN * deviation(r)), off <= alone
+
+
+def print_decimated(bpy, paths, touch):
+    counts = {share: np.zeros(6, dtype=int) for share in SHARES}
+    with blender.quiet():
+        for share, obj, dense in (of for path in paths for of in decimated(bpy, path)):
+            for place in places(obj, bpy.context.evaluated_depsgraph_get(), OF_MODELS, SEED):
+                if (found := touch(obj, place)) is None:
+                    continue
+                is_sure, is_of_facets = verdict(found) == "ok", verdict(found) == "facets"
+                counts[share][:1] += 1
+                if (beside := beside_dense(found, dense)) is not None:
+                    is_off, is_wrong, is_right = beside
+                    counts[share][1:] += [
+                        *(is_sure, is_sure and is_off, is_sure and is_wrong),
+                        *(is_of_facets, is_of_facets and is_right),
+                    ]
+    head = ["faces", "touches", "sure", "off by 1/4", "wrong", "doubts about facets", "not needed"]
+    table(head, [[f"1/{share}", *map(str, of)] for share, of in counts.items()])
 
 
 def print_tables(errors):

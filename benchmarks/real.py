@@ -39,7 +39,6 @@ from .whole import Rays
 PLANES, EXTENTS, STEPS = (3, 4, 5, 6), (32, 16, 8), 12
 # At most this many points of the mesh above a domain are compared, and at least this many.
 HOLD_OUT, LEAST = 90, 20
-LAYERS = 4
 # Newton's method toward a surface: the number of steps, the longest step in radii, and the least slope.
 NEWTON_STEPS, FARTHEST, LEAST_CHANGE = 8, 0.3, 0.2
 OFF, TOO_FAR, SILENT, TURNED, ALIKE = 0.02, 3.0, 5.0, 10.0, 0.05
@@ -71,34 +70,6 @@ class Scan(Rays):
         """Pairs of a random point (3,) and the normal (3,) there, random by area."""
         faces = np.random.default_rng(seed).choice(len(self.areas), count, p=self.areas / self.areas.sum())
         return zip(self.centers[faces], self.normals[faces], strict=True)
-
-    def above(self, r, flat):
-        """Points (m, 3) of the scan along the normal of r over the points `flat` (n, 2), where there are any.
-
-        They are of the layers nearest to r whose outside is up.
-        """
-        up = r.frame.axes[:, 2]
-        starts = r.frame.to_world(np.column_stack([flat, r.height(*flat.T)]))
-        hits = [self._nearest(start, up, r.radius) for start in starts]
-        return np.array([hit for hit in hits if hit is not None]).reshape(-1, 3)
-
-    def _nearest(self, start, up, reach):
-        """The hit of the layer nearest to `start` along `up` or -up whose outside is up, or None."""
-        found = None
-        for direction in (up, -up):
-            gone = 0.0
-            for _ in range(LAYERS):
-                hit = self.ray_cast(start + gone * direction, direction, reach - gone)
-                if hit is None:
-                    break
-                gone = abs(np.dot(np.subtract(hit[0], start), up))
-                if np.dot(hit[1], up) > 0.0:
-                    found, reach = hit[0], gone
-                    break
-                gone += 1e-4 * reach
-                if gone >= reach:
-                    break
-        return found
 
 
 class Touch(NamedTuple):

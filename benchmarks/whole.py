@@ -10,6 +10,7 @@ from core.atlas.object_atlas import Atlas, joined_surface
 from core.steps import result_of
 
 NOISE = 0.0005
+LAYERS = 4
 EDGE = 0.008  # The length of an edge of the mesh; those of Poisson at depth 8 are half as long.
 
 
@@ -62,6 +63,34 @@ class Rays:
     def ray_cast(self, origin, direction, distance):
         hit, normal, _, _ = self.tree.ray_cast(origin, direction, distance)
         return None if hit is None else (tuple(hit), tuple(normal))
+
+    def above(self, r, flat):
+        """Points (m, 3) of the mesh along the normal of r over the points `flat` (n, 2), where there are any.
+
+        They are of the layers nearest to r whose outside is up.
+        """
+        up = r.frame.axes[:, 2]
+        starts = r.frame.to_world(np.column_stack([flat, r.height(*flat.T)]))
+        hits = [self._nearest(start, up, r.radius) for start in starts]
+        return np.array([hit for hit in hits if hit is not None]).reshape(-1, 3)
+
+    def _nearest(self, start, up, reach):
+        """The hit of the layer nearest to `start` along `up` or -up whose outside is up, or None."""
+        found = None
+        for direction in (up, -up):
+            gone = 0.0
+            for _ in range(LAYERS):
+                hit = self.ray_cast(start + gone * direction, direction, reach - gone)
+                if hit is None:
+                    break
+                gone = abs(np.dot(np.subtract(hit[0], start), up))
+                if np.dot(hit[1], up) > 0.0:
+                    found, reach = hit[0], gone
+                    break
+                gone += 1e-4 * reach
+                if gone >= reach:
+                    break
+        return found
 
 
 def away(tree, points):
