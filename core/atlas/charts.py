@@ -180,16 +180,11 @@ class Charts:
 
     def stds_at(self, x: Array, y: Array, patch: NDArray[np.intp]) -> Array:
         """Deviations (m,) of the heights at local (x, y), linear between knots."""
+        from scipy.ndimage import map_coordinates
+
         pitch = (2.0 * self.halves / (SIDE - 1))[patch]
-        at = np.clip(np.array([x, y]) / pitch + 0.5 * (SIDE - 1), 0.0, SIDE - 1.0)
-        first = np.minimum(at.astype(np.intp), SIDE - 2)
-        along_x, along_y = at - first
-        knot, stds = (patch * SIDE + first[0]) * SIDE + first[1], self.stds.ravel()
-        left, right = (
-            stds.take(start) + along_y * (stds.take(start + 1) - stds.take(start))
-            for start in (knot, knot + SIDE)
-        )
-        return left + along_x * (right - left)
+        at = np.array([patch, *(np.array([x, y]) / pitch + 0.5 * (SIDE - 1))])
+        return map_coordinates(self.stds, at, order=1, mode="nearest")
 
     @cached_property
     def mean_stds(self) -> Array:

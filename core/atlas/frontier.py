@@ -19,7 +19,7 @@ from ..arguments import Array
 from ..contours.contour import Contour, Vector, cross, dot, tangent_of, vector_of
 from ..contours.finger import Contact
 from ..reconstruction.result import Reconstruction
-from ..triangles import normalized, triangle_cross
+from ..triangles import far_apart, normalized, triangle_cross
 from .charts import AZIMUTHS, Charts
 from .connectivity import connected_pieces
 from .field import INSIDE, covered
@@ -122,11 +122,16 @@ class Frontier:
         """Contacts between the curves of a patch, where the finger taps it."""
         around = np.arange(0, AZIMUTHS, AZIMUTHS // RIM)
         xy = np.hstack([share * chart.rim_at(around[::step]) for share, step in BETWEEN])
-        places = np.stack(chart.world(np.zeros(xy.shape[1], dtype=np.intp), *xy), axis=1)
-        contacts = [self.finger.near(vector_of(p), vector_of(n), self.near) for p, n in places]
-        felt = np.array([contact for contact in contacts if contact is not None])
-        points, normals = felt.reshape(-1, 2, 3).transpose(1, 0, 2)
+        places = chart.world(np.zeros(xy.shape[1], dtype=np.intp), *xy)
+        felt = np.array(self.felt_near(*places)).reshape(-1, 2, 3)
+        points, normals = felt.transpose(1, 0, 2)
         return Contour(points + self.rng.normal(0.0, self.noise, (len(points), 1)) * normals, normals=normals)
+
+    def felt_near(self, points: Array, normals: Array) -> list[Contact]:
+        """The contacts of the finger near places (n, 3) with normals (n, 3), where there are some."""
+        places = zip(points, normals, strict=True)
+        contacts = (self.finger.near(vector_of(p), vector_of(n), self.near) for p, n in places)
+        return [contact for contact in contacts if contact is not None]
 
     def push(self, place: RimPlace, gain: float) -> None:
         """Queues a place by the area that a touch there may bring."""
@@ -202,13 +207,10 @@ class Frontier:
             away = np.linalg.norm(mesh.vertices[some] - mesh.vertices[some].mean(axis=0), axis=1)
             some = some[np.argsort(away, kind="stable")]
             some = some[np.unique(np.linspace(0, len(some) - 1, DISK_PLACES).astype(np.intp))]
-            places = ((vector_of(mesh.vertices[i]), vector_of(normals[i])) for i in some)
-            contacts = [contact for p, n in places if (contact := self.finger.near(p, n, self.near))]
-            chosen: list[Contact] = []
-            for contact in contacts if 2 * len(contacts) > len(some) else ():
-                if all(math.dist(contact[0], other[0]) > side for other in chosen):
-                    chosen.append(contact)
-            unfelt += [(RimPlace(*c, tangent_of(c[1], None), side), c) for c in chosen]
+            contacts = self.felt_near(mesh.vertices[some], normals[some])
+            if 2 * len(contacts) > len(some):
+                chosen = [contacts[i] for i in far_apart(np.array(contacts)[:, 0], side)]
+                unfelt += [(RimPlace(*c, tangent_of(c[1], None), side), c) for c in chosen]
         return unfelt
 
     def _forget_covered(self) -> Generator[None, None, None]:
@@ -310,10 +312,7 @@ def border_places(mesh: Mesh) -> Iterator[RimPlace]:
     corners, radius = mesh.vertices[mesh.border], BORDER_RADIUS * mesh.edge
     ups = normalized(mesh.normals[mesh.border].sum(axis=1))
     ways = normalized(np.cross(corners[:, 1] - corners[:, 0], ups))
-    taken = ~ways.any(axis=1)  # Triangles without an area have no way beyond them.
+    some = np.flatnonzero(ways.any(axis=1))  # Triangles without an area have no way beyond them.
     middles = corners.mean(axis=1)
-    for i, middle in enumerate(middles):
-        if taken[i]:
-            continue
-        taken |= ((middles - middle) ** 2).sum(axis=1) < (BORDER_APART * radius) ** 2
-        yield RimPlace(vector_of(middle), vector_of(ups[i]), vector_of(ways[i]), radius)
+    for i in some[far_apart(middles[some], BORDER_APART * radius)]:
+        yield RimPlace(vector_of(middles[i]), vector_of(ups[i]), vector_of(ways[i]), radius)

@@ -15,7 +15,7 @@ from ..contours.contour import Contour, SamplingPlane
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
 from ..steps import chunked, result_of
-from ..triangles import LEAST_DIVISOR, triangle_cross
+from ..triangles import LEAST_DIVISOR, far_apart, triangle_cross
 from ..verdict import FINER, TOUCHES, Doubt, Judged, beyond
 from .borders import Border, snapped_to_border
 from .boundaries import Edge, edges_of, gaussian_curvature_of, node_dict
@@ -237,12 +237,8 @@ class Atlas(Judged):
         """
         far = np.flatnonzero(self._farther(IMPROVABLE * (self.tolerance or 0.0)))
         away = np.abs(self._contacts[0])
-        chosen: list[int] = []
-        for i in far[np.argsort(-away[far], kind="stable")].tolist():
-            apart = np.linalg.norm(self.check.points[chosen] - self.check.points[i], axis=1)
-            if (apart >= away[chosen]).all():
-                chosen.append(i)
-        return np.array(chosen, dtype=np.intp)
+        far = far[np.argsort(-away[far], kind="stable")]
+        return far[far_apart(self.check.points[far], away[far])]
 
     def _farther(self, length: Array | float) -> NDArray[np.bool_]:
         """Which contacts of the check (n,) are farther from the surface than lengths (n,)."""

@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, number, unit_vector
 from ..contours.contour import Vector, along, cross, dot, scaled, tangent_of, vector_of
-from ..contours.finger import Surface, contact_of
+from ..contours.finger import Contact, Surface, contact_of
 from ..contours.tracking import generator_of
 from ..exploration.extent import Exploration
 from ..exploration.options import ExplorationOptions
 from ..exploration.side_by_side import exploring_many
 from ..steps import part_of, result_of
-from ..triangles import row_dot
+from ..triangles import far_apart, row_dot
 from .borders import felt_border, snapped_to_border
 from .charts import Charts
 from .field import covered
@@ -259,14 +259,8 @@ class _Run:
         points, normals = (np.array(values) for values in zip(*contacts, strict=True))
         left, first = np.arange(len(points)), len(self.found)
         while len(left) and self.done < self.most and not self.is_stopped:
-            few: list[int] = []
-            for i in left.tolist():
-                apart = np.linalg.norm(points[few] - points[i], axis=1)
-                if (
-                    len(few) < min(SIDE_BY_SIDE, self.most - self.done)
-                    and (apart > AGAIN_APART * farthest).all()
-                ):
-                    few.append(i)
+            few = left[far_apart(points[left], AGAIN_APART * farthest)]
+            few = few[: min(SIDE_BY_SIDE, self.most - self.done)]
             some = list(zip(points[few], normals[few], strict=True))
             new = yield from self.showing(self.touching(some, farthest, [NARROW] * len(some)))
             left = np.setdiff1d(left, few)
@@ -347,18 +341,13 @@ class _Run:
             for place, contact in zip(places, contacts, strict=True)
         ])  # fmt: skip
 
-    def uncertain_contacts(self, mesh: Mesh) -> list[PointNormal]:
+    def uncertain_contacts(self, mesh: Mesh) -> list[Contact]:
         """Contacts where the surface is less certain than LIMIT tolerances, apart from each other."""
-        left, normals = np.flatnonzero(mesh.std > LIMIT * self.tolerance), mesh.normals
-        contacts: list[PointNormal] = []
-        while len(left):
-            worst = left[np.argmax(mesh.std[left])]
-            point, normal = vector_of(mesh.vertices[worst]), vector_of(normals[worst])
-            contact = self.frontier.finger.near(point, normal, self.frontier.near)
-            contacts += [contact] if contact else []
-            apart = AGAIN_APART * self.frontier.charts.radii[mesh.patch[worst]]
-            left = left[((mesh.vertices[left] - mesh.vertices[worst]) ** 2).sum(axis=1) > apart**2]
-        return contacts
+        rough, normals = np.flatnonzero(mesh.std > LIMIT * self.tolerance), mesh.normals
+        rough = rough[np.argsort(-mesh.std[rough], kind="stable")]
+        apart = AGAIN_APART * self.frontier.charts.radii[mesh.patch[rough]]
+        places = rough[far_apart(mesh.vertices[rough], apart)]
+        return self.frontier.felt_near(mesh.vertices[places], normals[places])
 
 
 def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], float]:
