@@ -227,44 +227,31 @@ class Frontier:
     def beyond(self, places: Sequence[RimPlace]) -> list[Next | None]:
         """The touch that goes on from each place, or None if it would bring nothing."""
         touches: list[Next | None] = [None] * len(places)
-        middles = self._probe_disks(places)
         for share in REACHES:
             left = [i for i, touch in enumerate(touches) if touch is None]
-            new = [places[i] for i in left if (places[i], share) in middles]
-            wide = min(1.0, DISK_REACHES * share)
-            disks = [self._disk(place, middles[place, share], wide * place.radius) for place in new]
-            for place, disk in zip(new, self._uncovered_part(disks), strict=True):
+            some = [places[i] for i in left]
+            new = [place for place in some if share not in place.felt]
+            middles = self._uncovered_part([self._ahead(place, share) for place in new])
+            for place, middle in zip(new, middles, strict=True):
+                place.felt[share] = self._disk(place, middle, share) if len(middle) else middle
+            disks = self._uncovered_part([place.felt[share] for place in some])
+            for i, place, disk in zip(left, some, disks, strict=True):
                 place.felt[share] = disk
-            for i in left:
-                touches[i] = self._touch(places[i], share)
+                touches[i] = self._touch(place, share)
         return touches
 
-    def _disk(self, place: RimPlace, contact: Contact, radius: float) -> Array:
-        """What the finger feels around a contact beyond a place, (k, 2, 3)."""
+    def _ahead(self, place: RimPlace, share: float) -> Array:
+        """The contact of the finger that goes on from a place, (1, 2, 3), or none, (0, 2, 3)."""
+        reach = share * place.radius
+        contact = self.finger.ahead(place.point, place.normal, place.ahead, place.radius, reach)
+        return np.array([contact] if contact else []).reshape(-1, 2, 3)
+
+    def _disk(self, place: RimPlace, middle: Array, share: float) -> Array:
+        """What the finger feels around a contact (1, 2, 3) beyond a place, (k, 2, 3)."""
         rim = cross(place.normal, place.ahead)  # An edge along the rim leaves this across the normal.
-        return self.finger.disk(*contact, place.ahead if abs(dot(contact[1], rim)) > ALONG else rim, radius)
-
-    def _probe_disks(self, places: Sequence[RimPlace]) -> dict[tuple[RimPlace, float], Contact]:
-        """Notes what is still uncovered of the disks that were felt, and returns the middles of new ones.
-
-        These are uncovered contacts, by place and share.
-        """
-        disks, middles = {}, {}
-        for place in places:
-            for share in REACHES:
-                if share in place.felt:
-                    disks[place, share] = place.felt[share]
-                elif contact := self.finger.ahead(
-                    place.point, place.normal, place.ahead, place.radius, share * place.radius
-                ):
-                    middles[place, share], disks[place, share] = contact, np.array([contact])
-                else:
-                    place.felt[share] = np.zeros((0, 2, 3))
-        for (place, share), disk in zip(disks, self._uncovered_part(list(disks.values())), strict=True):
-            if not len(disk) or (place, share) not in middles:
-                place.felt[share] = disk
-                middles.pop((place, share), None)
-        return middles
+        point, normal = map(vector_of, middle[0])
+        tangent = place.ahead if abs(dot(normal, rim)) > ALONG else rim
+        return self.finger.disk(point, normal, tangent, min(1.0, DISK_REACHES * share) * place.radius)
 
     def _uncovered_part(self, disks: Sequence[Array]) -> list[Array]:
         """What no patch covers of disks (k, 2, 3), each: nothing if one covers the first contact, the middle.
