@@ -20,7 +20,7 @@ from .charts import AZIMUTHS, MARGIN, Charts, Pairs
 from .cubic_spline import SIDE, upsampled
 from .field import LAYER, sheet_facing
 from .finger import FACING
-from .smoothing_spline import ROUGHNESS, penalty, smoothing_spline
+from .smoothing_spline import penalty, smoothing_spline
 
 # python -m benchmarks.atlas chose these.
 ALIGNED = 0.75  # A contact is on a patch if the cosine of the angle between their normals is at least this.
@@ -59,9 +59,8 @@ def refit(
 
     every = np.arange(len(points))
     pairs = Pairs._make((yield from chunked(pairs_of, PLACES_AT_ONCE, 0.0, points, every)))
-    for order in ROUGHNESS:  # Otherwise the first spline would take ten times as long as the others.
-        penalty(order)
-        yield 0.0
+    penalty()  # Otherwise the first spline would take ten times as long as the others.
+    yield 0.0
     by_patch = np.argsort(pairs.patch, kind="stable")
     yield 0.0
     bounds = np.searchsorted(pairs.patch[by_patch], np.arange(len(results) + 1))
