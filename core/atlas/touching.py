@@ -24,7 +24,7 @@ from .charts import Charts
 from .field import covered
 from .finger import FACING, finger_at
 from .frontier import Frontier
-from .join import Table, blend_heights, refit
+from .join import Table, refit
 from .meshing import Mesh
 from .object_atlas import LIMIT, Atlas, Check, joined_surface
 from .reference_mesh import ReferenceMesh
@@ -303,7 +303,6 @@ class _Run:
         something else, and where the surface is less certain than the tolerance.
         """
         charts = yield from part_of(self.joining(earlier), 0.0, JOINED)
-        charts = yield from part_of(blend_heights(charts), 0.0, JOINED)
         patches = tuple(e.result for e in self.found)
         reference = yield from part_of(joined_surface(patches, charts, self.tolerance, self.off), JOINED, 1.0)
         yield 1.0
