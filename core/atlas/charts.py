@@ -27,6 +27,7 @@ REACH = 0.5  # A patch is evaluated at places up to this share of its radius abo
 CATMULL_ROM = np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]]) / 2.0
 ASIDE = 0.3  # What is farther than this share of the radius off the normal at its foot has no foot.
 STEEPEST = 0.4  # Where a patch is steeper, this cosine to its own plane, it has no feet: heights run away.
+PLACES_AT_ONCE = 3000  # A step takes this many places.
 CHUNK = 24_000  # This many pairs of a place and a patch fit into the processor's cache at once.
 
 

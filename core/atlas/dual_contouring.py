@@ -16,7 +16,7 @@ import numpy as np
 from ..arguments import Array
 from ..steps import chunked
 from ..triangles import normalized, row_dot, triangle_cross
-from .charts import Charts
+from .charts import PLACES_AT_ONCE, Charts
 from .connectivity import Indices
 from .field import INSIDE, Blend, nearest_sheet, sheet_facing
 from .indicator import Indicator
@@ -35,7 +35,6 @@ LEVEL = 1e-6  # The weight of the indicator's level beside planes of patches.
 FACING = 0.95  # A sheet faces as the planes of a vertex do if the cosine between their normals is more.
 # A quadrilateral whose diagonals are this many pitches apart has a vertex of its own, at the place nearest to
 BENT = 0.1  # the planes around its four cells. Without, an L is off by over five tolerances at its corners.
-PLACES_AT_ONCE = 3000  # A step takes this many places.
 
 
 class Sides(NamedTuple):

@@ -20,7 +20,7 @@ from ..contours.contour import Contour, Vector, cross, dot, tangent_of, vector_o
 from ..contours.finger import Contact
 from ..reconstruction.result import Reconstruction
 from ..triangles import far_apart, normalized, triangle_cross
-from .charts import AZIMUTHS, Charts
+from .charts import AZIMUTHS, PLACES_AT_ONCE, Charts
 from .connectivity import connected_pieces
 from .field import INSIDE, covered
 from .finger import DISK_PLACES, Finger
@@ -42,7 +42,6 @@ IN_VAIN = 2.0  # What is within this many radii of the least patch of a touch in
 TRIES = 3  # Touches go on from a place at most this many times.
 LOOK = 15  # This many other places are looked at together with the first of the queue, which is faster.
 ALONG = 0.9  # A direction is along another if the cosine of the angle between them is more.
-PLACES_AT_ONCE = 2000  # A step looks whether this many places are covered.
 TOUCHES_APART = 2.2  # Touches that are made side by side are this many radii apart.
 
 # Kernels of linear algebra round differently, which may not choose between what is equal but for rounding.

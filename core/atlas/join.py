@@ -15,7 +15,7 @@ from ..contours.contour import Contour
 from ..reconstruction.result import Reconstruction
 from ..steps import chunked
 from ..triangles import normalized, row_dot
-from .charts import AZIMUTHS, MARGIN, Charts, Pairs
+from .charts import AZIMUTHS, MARGIN, PLACES_AT_ONCE, Charts, Pairs
 from .cubic_spline import SIDE, upsampled
 from .smoothing_spline import penalty, smoothing_spline
 
@@ -25,7 +25,7 @@ UNDOUBTED = 2.0  # A contact that is off a patch by fewer of its deviations weig
 LOOSER = 5.0  # This many times larger they count a radius beyond the rim, where a patch is less certain.
 FARTHEST = 3.0  # A contact that is off by more times UNDOUBTED is on another sheet.
 LEAST_NOISE = 5e-4  # Contacts have at least this noise, as a share of the radius.
-PATCHES_AT_ONCE, PLACES_AT_ONCE = 2, 1500  # A step takes this many patches, or this many places.
+PATCHES_AT_ONCE = 2  # A step takes this many patches.
 FARTHEST_RIM = 1.25  # A patch that is not flat counts up to this many radii of its domain.
 KNOTS_WITHIN = 1.3  # Heights at knots are taken up to this many times the domain's radius.
 
