@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..steps import chunked, result_of
 from ..triangles import normalized, row_dot
 from .cubic_spline import CUBIC, SIDE, bspline_weights, cubics
 
@@ -189,21 +188,12 @@ class Charts:
     @cached_property
     def mean_stds(self) -> Array:
         """The mean deviation of the heights over each domain, (n,), a length."""
-        inside = self.inside(1.0)
+        along = self.halves[:, None] * np.linspace(-1.0, 1.0, SIDE)
+        x, y = (axis.ravel() for axis in np.broadcast_arrays(along[:, :, None], along[:, None]))
+        patch = np.repeat(np.arange(len(self.radii)), SIDE**2)
+        inside = self.shares(x, y, patch).reshape(self.stds.shape) <= 1.0
         means: Array = (self.stds * inside).sum(axis=(1, 2)) / np.maximum(inside.sum(axis=(1, 2)), 1)
         return self.radii * means
-
-    def inside(self, share: float) -> NDArray[np.bool_]:
-        """Which knots are in the domain scaled by this share about its origin, (n, SIDE, SIDE)."""
-        x, y = self.knots().reshape(2, -1)
-        patch = np.repeat(np.arange(len(self.radii)), SIDE**2)
-        (shares,) = result_of(chunked(lambda *some: (self.shares(*some),), CHUNK, 1.0, x, y, patch))
-        return shares.reshape(self.heights.shape) <= share
-
-    def knots(self) -> Array:
-        """Local x and y of all knots, (2, n, SIDE, SIDE)."""
-        along = self.halves[:, None] * np.linspace(-1.0, 1.0, SIDE)
-        return np.array(np.broadcast_arrays(along[:, :, None], along[:, None]))
 
     def widened(self, factor: float) -> "Charts":
         """Tables of these patches whose deviations are larger by a factor."""
