@@ -15,7 +15,7 @@ from hypothesis import settings
 from core import verdict
 from core.atlas import curvature, expected, object_atlas, samples, touching
 from core.atlas import measured as atlas_measured
-from core.bayes import bends, evidence, joint_fit, kernel, posterior, prior, process_fit
+from core.bayes import bends, evidence, kernel, posterior, prior, process_fit
 from core.contact_data import comments
 from core.contours import common_point, curves, finger, local_geometry, thinning
 from core.exploration import extent, taps
