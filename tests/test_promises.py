@@ -15,7 +15,7 @@ from hypothesis import settings
 from core import verdict
 from core.atlas import curvature, expected, object_atlas, samples, touching
 from core.atlas import measured as atlas_measured
-from core.bayes import bends, evidence, kernel, posterior, prior, process_fit
+from core.bayes import bends, evidence, joint_fit, kernel, posterior, prior, process_fit
 from core.contact_data import comments
 from core.contours import common_point, curves, finger, local_geometry, thinning
 from core.exploration import extent, taps
@@ -69,6 +69,7 @@ PROMISES = [
     ("methods", "counts with the power #,", evidence.POWER),
     ("methods", "by more than # times their noise", process_fit.UNEXPLAINED_MISFIT),
     ("methods", "a surface with g has odds of a fifth or more", 5 * evidence.ODDS),
+    ("methods", "median of those distances is more than # % of the radius", 100 * joint_fit.MISFIT),
     ("methods", "$(# / M)^3$ of the difference", bends.FEW_BENDS),
     ("methods", "at # places all over the patch", 6 * domain.GAUSS_ALONG * (domain.GAUSS_ACROSS + 1)),
     ("methods", "if one tap is off by more than ten standard deviations", taps.TOO_FAR_OFF / 10),

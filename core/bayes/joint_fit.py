@@ -40,7 +40,7 @@ class Observations(NamedTuple):
     contacts : (b, n, 3); normals : (b, n, 3), over their standard deviation, 0 where there is none; or
         (b, 0, 3) without
     tangent : (b, 3), which d1 is to follow
-    noise : (b,), standard deviation of a contact, at least
+    noise : (b,), standard deviation of a contact, at least; noise_is_known : (b,), whether it is no more
     point_std : (b,), standard deviation of the height at the origin, before contacts are known
     """
 
@@ -48,6 +48,7 @@ class Observations(NamedTuple):
     normals: Array
     tangent: Array
     noise: Array
+    noise_is_known: NDArray[np.bool_]
     point_std: Array
 
     def at(self, which: NDArray[np.bool_]) -> "Observations":

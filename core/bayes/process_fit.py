@@ -86,13 +86,14 @@ def process_fit(
     """
     b, least = len(weights), np.maximum(given.noise, PROCESS_MISFIT)
     turns, scales, fits = np.eye(3)[None].repeat(b, axis=0), np.ones(b), [posterior.at(i) for i in range(b)]
-    most = np.maximum(posterior.noise, least)
-    rms = np.sqrt((weights * residuals**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0))
+    off, most = np.abs(residuals), np.maximum(posterior.noise, least)
+    rms = np.sqrt((weights * off**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0))
     for i in np.flatnonzero(rms > UNEXPLAINED_MISFIT * least):
+        present = np.flatnonzero(weights[i])
         data = _with_point(given, weights[i], ranks(int(i)), float(offsets[i]), int(i))
         carried = data.at_places()
         hyper, use_gp = process_hyperparameters(*carried, float(least[i]), float(most[i]))
-        if not use_gp:
+        if not (use_gp or (given.noise_is_known[i] and _is_texture(off[i, present], float(given.noise[i])))):
             continue
         if rms[i] <= MISFIT:  # The polynomial averages facets, so its frame is kept.
             fits[i] = replace(process_posterior(data, hyper, posterior.visibility[i]), sextic=fits[i])
@@ -124,6 +125,15 @@ def _with_point(
     # Places are spread on each half of a curve, whichever way it runs and whichever curve is the first.
     places = np.flatnonzero(rank * min(n, MOST_PLACES) % n < MOST_PLACES)
     return process_data(np.vstack([given.contacts[i, present], point]), roots, normals, places)
+
+
+def _is_texture(off: Array, noise: float) -> bool:
+    """Whether most contacts of a touch, |dz| (n,) off their sextic, are off by more than noise and MISFIT.
+
+    Neither white noise nor outliers would explain that, and the sextic's deviation would not cover it. Without
+    this, patches of rough meshes end after one face (test_enough).
+    """
+    return 1.4826 * float(np.median(off)) > max(UNEXPLAINED_MISFIT * noise, MISFIT)
 
 
 def _mean_given(

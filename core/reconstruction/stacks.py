@@ -115,7 +115,7 @@ def _observations(start: Start, axes: Array, radii: Array, contacts: Array) -> O
         normals[:, : of_curves.shape[1]] = of_curves
     tangent = (start.tangents[:, None] @ axes)[:, 0]
     stds, point_stds = start.stds / radii, np.minimum(start.point_stds / radii, 1.0)
-    return Observations(contacts, normals, tangent, stds, point_stds)
+    return Observations(contacts, normals, tangent, stds, start.stds_are_known, point_stds)
 
 
 def _result(

@@ -65,6 +65,7 @@ class Start(NamedTuple):
     curves: Curves  # relative to the points, in the world
     strokes: list[Array]  # (m, 3) each, in the axes and in unit radius
     stds: Array  # (b,)
+    stds_are_known: NDArray[np.bool_]  # (b,), whether stds are all of the noise; that of means is more
     point_stds: Array  # (b,), of the points along the normal; infinite where only contacts show the surface
 
     @property
@@ -127,15 +128,19 @@ def _start(
     thin : the thinned contours of each, and the number of contacts in each mean
     """
     axes, kappas, radii = darboux_frames(curves, normals)
-    strokes, stds, point_stds = [], [], []
+    strokes, stds, known, point_stds = [], [], [], []
     for i, (point, touch, thin_curves) in enumerate(zip(points, touches, thin, strict=True)):
         contours = [contour for contour, _ in thin_curves]
         contacts, size = _stroke_means(curves.at(i), contours, axes[i], radii[i], point, touch)
         noises = [*(c.noise or 0.0 for c in contours), touch.noise / math.sqrt(size)]
         strokes.append(contacts)
         stds.append(_std(options.noise, max(size, min(number for _, number in thin_curves)), noises))
+        has_noise = options.noise is not None or None not in [c.noise for c in contours]
+        known.append(not len(contacts) and has_noise)
         point_stds.append(_point_std(point, touch.contours, options, radii[i]))
-    return Start(points, axes, kappas, radii, curves, strokes, np.array(stds), np.array(point_stds))
+    return Start(
+        points, axes, kappas, radii, curves, strokes, np.array(stds), np.array(known), np.array(point_stds)
+    )
 
 
 def _errors(
@@ -256,6 +261,7 @@ def strokes_start(
         curves=curves_through(*stacked(points[good], [[]] * len(good))),
         strokes=[contacts for contacts, _ in thin],
         stds=np.array([_std(noise, size, [touches[i].noise / math.sqrt(size)]) for i, size in sizes]),
+        stds_are_known=np.zeros(len(good), dtype=bool),
         point_stds=np.full(len(good), np.inf),
     )
     return start, none, errors
