@@ -5,7 +5,7 @@
 import numpy as np
 
 import core
-from core.atlas.join import blend_heights, charts_of, refit
+from core.atlas.join import charts_of, refit
 from core.atlas.object_atlas import Atlas, joined_surface
 from core.steps import result_of
 
@@ -31,7 +31,6 @@ def put_together(found, tolerance):
     results = [e.result for e in found]
     charts = charts_of(results, deviations=False)
     charts = result_of(refit([e.contours for e in found], results, charts, NOISE, {}))
-    charts = result_of(blend_heights(charts))
     return Atlas(tuple(results), charts, result_of(joined_surface(results, charts, tolerance)), tolerance)
 
 

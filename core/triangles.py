@@ -24,6 +24,16 @@ def normalized(vectors: Array) -> Array:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), LEAST_DIVISOR)
 
 
+def far_apart(points: Array, lengths: Array | float) -> list[int]:
+    """The indices of points (n, 3), in order, each farther from those before it than their lengths (n,)."""
+    left, chosen, lengths = np.arange(len(points)), [], np.broadcast_to(lengths, len(points))
+    while len(left):
+        first = int(left[0])
+        chosen.append(first)
+        left = left[1:][np.linalg.norm(points[left[1:]] - points[first], axis=1) > lengths[first]]
+    return chosen
+
+
 def triangle_cross(triangles: Array) -> Array:
     """The cross products (..., 3) of two sides of triangles (..., 3, 3).
 

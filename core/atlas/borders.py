@@ -18,7 +18,7 @@ from ..arguments import Array
 from ..contours.contour import vector_of
 from ..contours.finger import Contact
 from ..triangles import LEAST_DIVISOR, normalized, row_dot, triangle_cross
-from .connectivity import Indices, split_sides
+from .connectivity import Indices
 from .finger import Finger
 from .meshing import Mesh
 
@@ -198,7 +198,7 @@ def snapped_to_border(mesh: Mesh, border: Border) -> Mesh:
     # Where the mesh ends though the surface goes on, the way beyond is another.
     on = (np.linalg.norm(feet - vertices[at], axis=1) < REACH * edge) & (row_dot(toward, ways) > ALONG)
     vertices[at[on]] = feet[on]
-    return _welded(_cornered(_unfolded(mesh._replace(vertices=vertices), mesh), border.corners))
+    return _welded(_unfolded(_cornered(mesh._replace(vertices=vertices), border.corners), mesh))
 
 
 def _unfolded(mesh: Mesh, before: Mesh) -> Mesh:
@@ -243,20 +243,15 @@ def _welded(mesh: Mesh) -> Mesh:
 
 
 def _cornered(mesh: Mesh, corners: Array) -> Mesh:
-    """The mesh with those sides of its border split at corners (n, 3) that pass these by."""
-    ends, reach = np.sort(mesh.border, axis=1), REACH * mesh.edge
-    a, b = mesh.vertices[ends].transpose(1, 0, 2)
-    split: dict[int, tuple[float, Array]] = {}
-    for corner in corners:
-        detours = np.linalg.norm(corner - a, axis=1) + np.linalg.norm(corner - b, axis=1)
-        detours -= np.linalg.norm(b - a, axis=1)
-        best = int(np.argmin(detours))
-        if max(SAME * reach, split.get(best, (0.0,))[0]) < detours[best] < reach:
-            split[best] = float(detours[best]), corner
-    sides, points = ends[list(split)], np.array([corner for _, corner in split.values()]).reshape(-1, 3)
-    at = np.append(np.arange(len(mesh.vertices)), sides[:, 0])
-    triangles = split_sides(mesh.triangles, sides, len(mesh.vertices))
-    return Mesh(np.vstack([mesh.vertices, points]), triangles, mesh.std[at], mesh.patch[at])
+    """The mesh with the nearer end of the side of its border that passes a corner (n, 3) by at the corner."""
+    sides, vertices, row = mesh.border, mesh.vertices.copy(), np.arange(len(corners))
+    ends = vertices[sides]
+    away = np.linalg.norm(corners[:, None, None] - ends, axis=3)
+    best = np.argmin(away.sum(axis=2) - np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), axis=1)
+    away, moved = away[row, best].min(axis=1), sides[best, away[row, best].argmin(axis=1)]
+    is_near = away < REACH * mesh.edge
+    vertices[moved[is_near]] = corners[is_near]
+    return mesh._replace(vertices=vertices)
 
 
 def _feet(border: Border, points: Array) -> tuple[Array, Array]:

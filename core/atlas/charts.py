@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..steps import chunked, result_of
 from ..triangles import normalized, row_dot
 from .cubic_spline import CUBIC, SIDE, bspline_weights, cubics
 
@@ -26,8 +25,8 @@ REACH = 0.5  # A patch is evaluated at places up to this share of its radius abo
 # Weights of four neighbors (Catmull and Rom 1974), by the share of the way between the middle two.
 CATMULL_ROM = np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]]) / 2.0
 ASIDE = 0.3  # What is farther than this share of the radius off the normal at its foot has no foot.
-FLAT = 0.15  # A patch is flat if it is nowhere steeper than this slope to its own plane.
 STEEPEST = 0.4  # Where a patch is steeper, this cosine to its own plane, it has no feet: heights run away.
+PLACES_AT_ONCE = 3000  # A step takes this many places.
 CHUNK = 24_000  # This many pairs of a place and a patch fit into the processor's cache at once.
 
 
@@ -180,58 +179,31 @@ class Charts:
 
     def stds_at(self, x: Array, y: Array, patch: NDArray[np.intp]) -> Array:
         """Deviations (m,) of the heights at local (x, y), linear between knots."""
+        from scipy.ndimage import map_coordinates
+
         pitch = (2.0 * self.halves / (SIDE - 1))[patch]
-        at = np.clip(np.array([x, y]) / pitch + 0.5 * (SIDE - 1), 0.0, SIDE - 1.0)
-        first = np.minimum(at.astype(np.intp), SIDE - 2)
-        along_x, along_y = at - first
-        knot, stds = (patch * SIDE + first[0]) * SIDE + first[1], self.stds.ravel()
-        left, right = (
-            stds.take(start) + along_y * (stds.take(start + 1) - stds.take(start))
-            for start in (knot, knot + SIDE)
-        )
-        return left + along_x * (right - left)
+        at = np.array([patch, *(np.array([x, y]) / pitch + 0.5 * (SIDE - 1))])
+        return map_coordinates(self.stds, at, order=1, mode="nearest")
 
     @cached_property
     def mean_stds(self) -> Array:
         """The mean deviation of the heights over each domain, (n,), a length."""
-        inside = self.inside(1.0)
+        along = self.halves[:, None] * np.linspace(-1.0, 1.0, SIDE)
+        x, y = (axis.ravel() for axis in np.broadcast_arrays(along[:, :, None], along[:, None]))
+        patch = np.repeat(np.arange(len(self.radii)), SIDE**2)
+        inside = self.shares(x, y, patch).reshape(self.stds.shape) <= 1.0
         means: Array = (self.stds * inside).sum(axis=(1, 2)) / np.maximum(inside.sum(axis=(1, 2)), 1)
         return self.radii * means
 
-    def inside(self, share: float) -> NDArray[np.bool_]:
-        """Which knots are in the domain scaled by this share about its origin, (n, SIDE, SIDE)."""
-        x, y = self.knots().reshape(2, -1)
-        patch = np.repeat(np.arange(len(self.radii)), SIDE**2)
-        (shares,) = result_of(chunked(lambda *some: (self.shares(*some),), CHUNK, 1.0, x, y, patch))
-        return shares.reshape(self.heights.shape) <= share
-
-    @cached_property
-    def is_flat(self) -> NDArray[np.bool_]:
-        """Which patches are flat, (n,), by the slopes between neighboring knots of their domains."""
-        inside, pitch = self.inside(1.0), (2.0 * self.halves / (SIDE - 1))[:, None, None]
-        steps = np.stack([self.heights[:, 1:, :-1], self.heights[:, :-1, 1:]]) - self.heights[:, :-1, :-1]
-        steep = (np.hypot(*steps) > FLAT * pitch) & inside[:, :-1, :-1]
-        return ~steep.any(axis=(1, 2))
-
-    def knots(self) -> Array:
-        """Local x and y of all knots, (2, n, SIDE, SIDE)."""
-        along = self.halves[:, None] * np.linspace(-1.0, 1.0, SIDE)
-        return np.array(np.broadcast_arrays(along[:, :, None], along[:, None]))
-
     def widened(self, factor: float) -> "Charts":
         """Tables of these patches whose deviations are larger by a factor."""
-        wider = replace(self, stds=factor * self.stds)
-        vars(wider)["is_flat"] = self.is_flat  # where cached_property looks: it does not depend on these
-        return wider
+        return replace(self, stds=factor * self.stds)
 
     def joined(self, others: "Charts") -> "Charts":
         """The tables of these patches, followed by others."""
-        both = Charts(
+        return Charts(
             *(np.concatenate([getattr(self, f.name), getattr(others, f.name)]) for f in fields(Charts))
         )
-        # Otherwise each touch would look at the knots of all patches before it again.
-        vars(both)["is_flat"] = np.append(self.is_flat, others.is_flat)
-        return both
 
     def rim_at(self, azimuths: NDArray[np.intp]) -> Array:
         """Local x and y (2, k) of the first patch's rim, at some of its AZIMUTHS."""

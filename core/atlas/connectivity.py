@@ -44,29 +44,3 @@ def pieces_of(graph: Any, some: Indices) -> Indices:
 
     pieces: Indices = connected_components(graph[some][:, some], directed=False)[1]
     return pieces
-
-
-def split_sides(triangles: Indices, sides: Indices, new: int) -> Indices:
-    """Triangles (m, 3) split at vertices new, new + 1, ... on sides (n, 2), the lower index first."""
-    if not len(sides):
-        return triangles
-    keys = sides[:, 0] * new + sides[:, 1]
-    order = np.argsort(keys)
-    wanted = keyed_sides(triangles, new)[1].reshape(-1, 3)
-    at = np.minimum(np.searchsorted(keys[order], wanted), len(keys) - 1)
-    middle = np.where(keys[order][at] == wanted, new + order[at], -1)
-    halves = (middle >= 0).sum(axis=1)
-    split = [triangles[halves == 0]]
-    for count in (1, 2, 3):
-        some, mid = triangles[halves == count], middle[halves == count]
-        # With one side split, it comes first; with two, the whole one comes last.
-        turn = np.argmax(mid >= 0, axis=1) if count == 1 else (np.argmin(mid, axis=1) + 1) % 3
-        turned = (turn[:, None] + np.arange(3)) % 3
-        (a, b, c), (p, q, r) = np.take_along_axis(some, turned, 1).T, np.take_along_axis(mid, turned, 1).T
-        parts = {
-            1: [(a, p, c), (p, b, c)],
-            2: [(p, b, q), (a, p, q), (a, q, c)],
-            3: [(a, p, r), (p, b, q), (r, q, c), (p, q, r)],
-        }[count]
-        split += [np.stack(part, axis=1) for part in parts]
-    return np.concatenate(split)

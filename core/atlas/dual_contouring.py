@@ -16,7 +16,7 @@ import numpy as np
 from ..arguments import Array
 from ..steps import chunked
 from ..triangles import normalized, row_dot, triangle_cross
-from .charts import Charts
+from .charts import PLACES_AT_ONCE, Charts
 from .connectivity import Indices
 from .field import INSIDE, Blend, nearest_sheet, sheet_facing
 from .indicator import Indicator
@@ -31,12 +31,10 @@ SLACK = 1.0  # A vertex is at most this many pitches outside of its cell: the ti
 SOFT = 0.07  # A vertex does not move along planes that turn less, as mean squares of their sines: with .02 a
 # surface without creases has folds, as around Suzanne's eyes (some three times as many).
 ITERATIONS = 4  # With one, a cube's edges are off by 1e-4 of its size.
-SWEEPS = 12  # A vertex that is held near its cell is moved along each axis this often.
 LEVEL = 1e-6  # The weight of the indicator's level beside planes of patches.
 FACING = 0.95  # A sheet faces as the planes of a vertex do if the cosine between their normals is more.
 # A quadrilateral whose diagonals are this many pitches apart has a vertex of its own, at the place nearest to
 BENT = 0.1  # the planes around its four cells. Without, an L is off by over five tolerances at its corners.
-PLACES_AT_ONCE = 3000  # A step takes this many places.
 
 
 class Sides(NamedTuple):
@@ -228,21 +226,8 @@ def _vertices(
     for _ in range(ITERATIONS):
         left = right - np.einsum("mij,mj->mi", square, step)
         step += np.linalg.solve(soft, square @ left[..., None])[..., 0]
-    low, high = (centers + side * (0.5 + SLACK) * pitch - middle for side in (-1.0, 1.0))
-    out = np.flatnonzero(((step < low) | (step > high)).any(axis=1))
-    right = np.einsum("mij,mj->mi", square, right)
-    step[out] = _held(soft[out], right[out], low[out], high[out])
-    return middle + step, up
-
-
-def _held(square: Array, right: Array, low: Array, high: Array) -> Array:
-    """The x (m, 3) from `low` to `high` that minimize x' square x / 2 - right' x, by coordinate descent."""
-    x = np.clip(0.0 * right, low, high)
-    for _ in range(SWEEPS):
-        for i in range(3):
-            move = (right[:, i] - row_dot(square[:, i], x)) / square[:, i, i]
-            x[:, i] = np.clip(x[:, i] + move, low[:, i], high[:, i])
-    return x
+    reach = (0.5 + SLACK) * pitch
+    return np.clip(middle + step, centers - reach, centers + reach), up
 
 
 def _on_sheet(charts: Charts, reach: float, vertices: Array, up: Array, *own: Any) -> tuple[Any, ...]:

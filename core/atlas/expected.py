@@ -16,7 +16,7 @@ from ..exploration.options import ExplorationOptions
 from ..exploration.side_by_side import exploring_many
 from ..reconstruction.result import Reconstruction
 from ..steps import result_of
-from .finger import finger_at
+from .finger import FACING, finger_at
 from .rims import radial_extent
 from .samples import OPPOSITE, THIN_SHARE
 from .touching import FIRST_EXTENT, NEAR
@@ -26,7 +26,6 @@ ROUNDS, AT_ONCE = 3, 4  # The rounds, and the touches of each, at places that no
 LATER = 8  # The last patches, this number of them, are as large as those to come,
 OVERLAP = 3.0  # which overlap, so that they have this many times the area that is left.
 INSIDE = 1e-5  # Rays across walls begin this share of the size below the surface.
-FACING = 0.5  # A patch covers walls that face as it does, by this cosine or more.
 
 
 def expected_touches(

@@ -19,8 +19,8 @@ from ..arguments import Array
 from ..contours.contour import Contour, Vector, cross, dot, tangent_of, vector_of
 from ..contours.finger import Contact
 from ..reconstruction.result import Reconstruction
-from ..triangles import normalized, triangle_cross
-from .charts import AZIMUTHS, Charts
+from ..triangles import far_apart, normalized, triangle_cross
+from .charts import AZIMUTHS, PLACES_AT_ONCE, Charts
 from .connectivity import connected_pieces
 from .field import INSIDE, covered
 from .finger import DISK_PLACES, Finger
@@ -42,7 +42,6 @@ IN_VAIN = 2.0  # What is within this many radii of the least patch of a touch in
 TRIES = 3  # Touches go on from a place at most this many times.
 LOOK = 15  # This many other places are looked at together with the first of the queue, which is faster.
 ALONG = 0.9  # A direction is along another if the cosine of the angle between them is more.
-PLACES_AT_ONCE = 2000  # A step looks whether this many places are covered.
 TOUCHES_APART = 2.2  # Touches that are made side by side are this many radii apart.
 
 # Kernels of linear algebra round differently, which may not choose between what is equal but for rounding.
@@ -122,11 +121,16 @@ class Frontier:
         """Contacts between the curves of a patch, where the finger taps it."""
         around = np.arange(0, AZIMUTHS, AZIMUTHS // RIM)
         xy = np.hstack([share * chart.rim_at(around[::step]) for share, step in BETWEEN])
-        places = np.stack(chart.world(np.zeros(xy.shape[1], dtype=np.intp), *xy), axis=1)
-        contacts = [self.finger.near(vector_of(p), vector_of(n), self.near) for p, n in places]
-        felt = np.array([contact for contact in contacts if contact is not None])
-        points, normals = felt.reshape(-1, 2, 3).transpose(1, 0, 2)
+        places = chart.world(np.zeros(xy.shape[1], dtype=np.intp), *xy)
+        felt = np.array(self.felt_near(*places)).reshape(-1, 2, 3)
+        points, normals = felt.transpose(1, 0, 2)
         return Contour(points + self.rng.normal(0.0, self.noise, (len(points), 1)) * normals, normals=normals)
+
+    def felt_near(self, points: Array, normals: Array) -> list[Contact]:
+        """The contacts of the finger near places (n, 3) with normals (n, 3), where there are some."""
+        places = zip(points, normals, strict=True)
+        contacts = (self.finger.near(vector_of(p), vector_of(n), self.near) for p, n in places)
+        return [contact for contact in contacts if contact is not None]
 
     def push(self, place: RimPlace, gain: float) -> None:
         """Queues a place by the area that a touch there may bring."""
@@ -202,13 +206,10 @@ class Frontier:
             away = np.linalg.norm(mesh.vertices[some] - mesh.vertices[some].mean(axis=0), axis=1)
             some = some[np.argsort(away, kind="stable")]
             some = some[np.unique(np.linspace(0, len(some) - 1, DISK_PLACES).astype(np.intp))]
-            places = ((vector_of(mesh.vertices[i]), vector_of(normals[i])) for i in some)
-            contacts = [contact for p, n in places if (contact := self.finger.near(p, n, self.near))]
-            chosen: list[Contact] = []
-            for contact in contacts if 2 * len(contacts) > len(some) else ():
-                if all(math.dist(contact[0], other[0]) > side for other in chosen):
-                    chosen.append(contact)
-            unfelt += [(RimPlace(*c, tangent_of(c[1], None), side), c) for c in chosen]
+            contacts = self.felt_near(mesh.vertices[some], normals[some])
+            if 2 * len(contacts) > len(some):
+                chosen = [contacts[i] for i in far_apart(np.array(contacts)[:, 0], side)]
+                unfelt += [(RimPlace(*c, tangent_of(c[1], None), side), c) for c in chosen]
         return unfelt
 
     def _forget_covered(self) -> Generator[None, None, None]:
@@ -225,44 +226,31 @@ class Frontier:
     def beyond(self, places: Sequence[RimPlace]) -> list[Next | None]:
         """The touch that goes on from each place, or None if it would bring nothing."""
         touches: list[Next | None] = [None] * len(places)
-        middles = self._probe_disks(places)
         for share in REACHES:
             left = [i for i, touch in enumerate(touches) if touch is None]
-            new = [places[i] for i in left if (places[i], share) in middles]
-            wide = min(1.0, DISK_REACHES * share)
-            disks = [self._disk(place, middles[place, share], wide * place.radius) for place in new]
-            for place, disk in zip(new, self._uncovered_part(disks), strict=True):
+            some = [places[i] for i in left]
+            new = [place for place in some if share not in place.felt]
+            middles = self._uncovered_part([self._ahead(place, share) for place in new])
+            for place, middle in zip(new, middles, strict=True):
+                place.felt[share] = self._disk(place, middle, share) if len(middle) else middle
+            disks = self._uncovered_part([place.felt[share] for place in some])
+            for i, place, disk in zip(left, some, disks, strict=True):
                 place.felt[share] = disk
-            for i in left:
-                touches[i] = self._touch(places[i], share)
+                touches[i] = self._touch(place, share)
         return touches
 
-    def _disk(self, place: RimPlace, contact: Contact, radius: float) -> Array:
-        """What the finger feels around a contact beyond a place, (k, 2, 3)."""
+    def _ahead(self, place: RimPlace, share: float) -> Array:
+        """The contact of the finger that goes on from a place, (1, 2, 3), or none, (0, 2, 3)."""
+        reach = share * place.radius
+        contact = self.finger.ahead(place.point, place.normal, place.ahead, place.radius, reach)
+        return np.array([contact] if contact else []).reshape(-1, 2, 3)
+
+    def _disk(self, place: RimPlace, middle: Array, share: float) -> Array:
+        """What the finger feels around a contact (1, 2, 3) beyond a place, (k, 2, 3)."""
         rim = cross(place.normal, place.ahead)  # An edge along the rim leaves this across the normal.
-        return self.finger.disk(*contact, place.ahead if abs(dot(contact[1], rim)) > ALONG else rim, radius)
-
-    def _probe_disks(self, places: Sequence[RimPlace]) -> dict[tuple[RimPlace, float], Contact]:
-        """Notes what is still uncovered of the disks that were felt, and returns the middles of new ones.
-
-        These are uncovered contacts, by place and share.
-        """
-        disks, middles = {}, {}
-        for place in places:
-            for share in REACHES:
-                if share in place.felt:
-                    disks[place, share] = place.felt[share]
-                elif contact := self.finger.ahead(
-                    place.point, place.normal, place.ahead, place.radius, share * place.radius
-                ):
-                    middles[place, share], disks[place, share] = contact, np.array([contact])
-                else:
-                    place.felt[share] = np.zeros((0, 2, 3))
-        for (place, share), disk in zip(disks, self._uncovered_part(list(disks.values())), strict=True):
-            if not len(disk) or (place, share) not in middles:
-                place.felt[share] = disk
-                middles.pop((place, share), None)
-        return middles
+        point, normal = map(vector_of, middle[0])
+        tangent = place.ahead if abs(dot(normal, rim)) > ALONG else rim
+        return self.finger.disk(point, normal, tangent, min(1.0, DISK_REACHES * share) * place.radius)
 
     def _uncovered_part(self, disks: Sequence[Array]) -> list[Array]:
         """What no patch covers of disks (k, 2, 3), each: nothing if one covers the first contact, the middle.
@@ -310,10 +298,7 @@ def border_places(mesh: Mesh) -> Iterator[RimPlace]:
     corners, radius = mesh.vertices[mesh.border], BORDER_RADIUS * mesh.edge
     ups = normalized(mesh.normals[mesh.border].sum(axis=1))
     ways = normalized(np.cross(corners[:, 1] - corners[:, 0], ups))
-    taken = ~ways.any(axis=1)  # Triangles without an area have no way beyond them.
+    some = np.flatnonzero(ways.any(axis=1))  # Triangles without an area have no way beyond them.
     middles = corners.mean(axis=1)
-    for i, middle in enumerate(middles):
-        if taken[i]:
-            continue
-        taken |= ((middles - middle) ** 2).sum(axis=1) < (BORDER_APART * radius) ** 2
-        yield RimPlace(vector_of(middle), vector_of(ups[i]), vector_of(ways[i]), radius)
+    for i in some[far_apart(middles[some], BORDER_APART * radius)]:
+        yield RimPlace(vector_of(middles[i]), vector_of(ups[i]), vector_of(ways[i]), radius)

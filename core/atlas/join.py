@@ -2,11 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Patches of one object as tables, and joined: each becomes a spline through the contacts of all patches.
 
-A single patch has only its own few curves. Where patches overlap, they are moved until they agree.
+A single patch has only its own few curves.
 """
 
 from collections.abc import Generator, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +15,9 @@ from ..contours.contour import Contour
 from ..reconstruction.result import Reconstruction
 from ..steps import chunked
 from ..triangles import normalized, row_dot
-from .charts import AZIMUTHS, MARGIN, Charts, Pairs
+from .charts import AZIMUTHS, MARGIN, PLACES_AT_ONCE, Charts, Pairs
 from .cubic_spline import SIDE, upsampled
-from .field import LAYER, sheet_facing
-from .finger import FACING
-from .smoothing_spline import ROUGHNESS, penalty, smoothing_spline
+from .smoothing_spline import penalty, smoothing_spline
 
 # python -m benchmarks.atlas chose these.
 ALIGNED = 0.75  # A contact is on a patch if the cosine of the angle between their normals is at least this.
@@ -28,14 +25,11 @@ UNDOUBTED = 2.0  # A contact that is off a patch by fewer of its deviations weig
 LOOSER = 5.0  # This many times larger they count a radius beyond the rim, where a patch is less certain.
 FARTHEST = 3.0  # A contact that is off by more times UNDOUBTED is on another sheet.
 LEAST_NOISE = 5e-4  # Contacts have at least this noise, as a share of the radius.
-PATCHES_AT_ONCE, PLACES_AT_ONCE = 2, 1500  # A step takes this many patches, or this many places.
+PATCHES_AT_ONCE = 2  # A step takes this many patches.
 FARTHEST_RIM = 1.25  # A patch that is not flat counts up to this many radii of its domain.
 KNOTS_WITHIN = 1.3  # Heights at knots are taken up to this many times the domain's radius.
-ROUNDS = 2  # Patches are moved this often.
-MOVED = 2.0  # A place is moved by fewer deviations than this: what is more is of a patch beyond its crease.
 
 Table = tuple[Array, float, Array, Array]  # Radii of the domain, half the side, coefficients, deviations.
-Joining = Generator[float, None, Charts]
 
 
 def refit(
@@ -44,7 +38,7 @@ def refit(
     charts: Charts,
     noise: float,
     earlier: dict[int, tuple[int, Table]],
-) -> Joining:
+) -> Generator[float, None, Charts]:
     """The tables of patches fitted to all contacts on them. Yields the share that is done.
 
     charts : the tables of the same patches, fitted only to their own contacts
@@ -59,9 +53,8 @@ def refit(
 
     every = np.arange(len(points))
     pairs = Pairs._make((yield from chunked(pairs_of, PLACES_AT_ONCE, 0.0, points, every)))
-    for order in ROUGHNESS:  # Otherwise the first spline would take ten times as long as the others.
-        penalty(order)
-        yield 0.0
+    penalty()  # Otherwise the first spline would take ten times as long as the others.
+    yield 0.0
     by_patch = np.argsort(pairs.patch, kind="stable")
     yield 0.0
     bounds = np.searchsorted(pairs.patch[by_patch], np.arange(len(results) + 1))
@@ -98,40 +91,6 @@ def _joined_table(
     local = (points[place] - r.frame.origin) @ r.frame.axes / r.radius
     weights = 1.0 / np.maximum(off[on], 1.0) ** 2
     return rim, half, *smoothing_spline(local, normals[place] @ r.frame.axes, weights, half, least)
-
-
-def blend_heights(charts: Charts) -> Joining:
-    """The patches moved onto the blend of all of them, as often as ROUNDS; yields 1 after each part."""
-    from scipy.ndimage import spline_filter1d
-
-    x, y = charts.knots().reshape(2, -1)
-    knots = np.flatnonzero(charts.inside(KNOTS_WITHIN))
-    yield 1.0
-    for _ in range(ROUNDS):
-        moves = np.zeros(charts.heights.shape)
-        for start in range(0, len(knots), PLACES_AT_ONCE):
-            some = knots[start : start + PLACES_AT_ONCE]
-            moves.ravel()[some] = _move(charts, some // SIDE**2, x[some], y[some], charts.stds.ravel()[some])
-            yield 1.0
-        # The outermost knots are beyond the spline, without a height: they move like those next to them.
-        change = np.pad(moves[:, 1:-1, 1:-1], ((0, 0), (1, 1), (1, 1)), mode="edge")
-        for axis in (1, 2):
-            change = spline_filter1d(change, order=3, axis=axis, mode="mirror")
-            yield 1.0
-        charts = replace(charts, heights=charts.heights + change)
-    return charts
-
-
-def _move(charts: Charts, patch: NDArray[np.intp], x: Array, y: Array, std: Array) -> Array:
-    """How far patches (k,) have to move above local (x, y), in unit radius, to lie on the blend.
-
-    std : (k,), deviations of their heights there
-    """
-    points, normals = charts.world(patch, x, y)
-    field = sheet_facing(charts, points, normals, LAYER * charts.radii[patch])
-    up = row_dot(field.normal, charts.axes[patch, :, 2])
-    move = -field.distance / np.maximum(up, FACING) / charts.radii[patch]
-    return np.where((field.patch >= 0) & (up > FACING) & (np.abs(move) < MOVED * std), move, 0.0)
 
 
 def _contacts(contours: Sequence[list[Contour]]) -> tuple[Array, Array, NDArray[np.intp]]:

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from ..steps import chunked
 from ..triangles import normalized, row_dot, triangle_cross
-from .charts import Charts
+from .charts import PLACES_AT_ONCE, Charts
 from .connectivity import Indices, connected_pieces, keyed_sides
-from .dual_contouring import PLACES_AT_ONCE, Surface, dual_contour
+from .dual_contouring import Surface, dual_contour
 from .field import AGREE, INSIDE
 from .indicator import Indicator
 

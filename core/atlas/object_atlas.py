@@ -15,7 +15,7 @@ from ..contours.contour import Contour, SamplingPlane
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
 from ..steps import chunked, result_of
-from ..triangles import LEAST_DIVISOR, triangle_cross
+from ..triangles import LEAST_DIVISOR, far_apart, triangle_cross
 from ..verdict import FINER, TOUCHES, Doubt, Judged, beyond
 from .borders import Border, snapped_to_border
 from .boundaries import Edge, edges_of, gaussian_curvature_of, node_dict
@@ -33,7 +33,6 @@ from .samples import indicated
 FINE, SHARE, FINEST = 1.0 / 160.0, 1.0 / 60.0, 4e-3
 LIMIT, ROUGH = 1.5, 0.01  # At most this share of the surface has a deviation above this many tolerances.
 OFF_STDS, OFF_TOLERANCES = 5.0, 3.0  # A contact contradicts the surface from this many of both away.
-IMPROVABLE = 1.0  # A touch improves the surface where a contact is this many tolerances away.
 THIN = 0.9  # Walls are resolved from this share of the thickness that cells are made for.
 BORDER = 2.0  # Beyond the border of the mesh it does from this many edges away.
 WITHIN_90 = 1.645  # This many deviations are a 90 % interval.
@@ -230,19 +229,15 @@ class Atlas(Judged):
 
     @property
     def improvable(self) -> NDArray[np.intp]:
-        """The contacts of the check (k,) that are so far from the surface that a touch there improves it.
+        """The contacts of the check (k,) over a tolerance from the surface, where a touch improves it.
 
         None is nearer to one before it than that is to the surface: a touch that finds another part of the
         object is continued there.
         """
-        far = np.flatnonzero(self._farther(IMPROVABLE * (self.tolerance or 0.0)))
+        far = np.flatnonzero(self._farther(self.tolerance or 0.0))
         away = np.abs(self._contacts[0])
-        chosen: list[int] = []
-        for i in far[np.argsort(-away[far], kind="stable")].tolist():
-            apart = np.linalg.norm(self.check.points[chosen] - self.check.points[i], axis=1)
-            if (apart >= away[chosen]).all():
-                chosen.append(i)
-        return np.array(chosen, dtype=np.intp)
+        far = far[np.argsort(-away[far], kind="stable")]
+        return far[far_apart(self.check.points[far], away[far])]
 
     def _farther(self, length: Array | float) -> NDArray[np.bool_]:
         """Which contacts of the check (n,) are farther from the surface than lengths (n,)."""

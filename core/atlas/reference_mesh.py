@@ -138,18 +138,7 @@ class ReferenceMesh:
         up, side = self.normals[triangle], row_dot(points - feet, self.normals[triangle])
         surface, feet = self._project(charts, feet, up)
         off = points - feet
-        ahead = row_dot(off, surface.normal)
-        away = np.linalg.norm(off, axis=1)
-        # A triangle is a chord: the foot of its plane is a little off that of the surface.
-        across = off - ahead[:, None] * surface.normal
-        some = np.flatnonzero((np.abs(ahead) > AHEAD * away) & (np.linalg.norm(across, axis=1) < self.edge))
-        tried_surface, tried = self._project(charts, feet[some] + across[some], up[some])
-        left = np.linalg.norm(points[some] - tried, axis=1)
-        nearer = (left < away[some]) & (np.abs(tried_surface.distance) < tried_surface.std)
-        some = some[nearer]
-        for old, new in zip((away, feet, *surface), (left, tried, *tried_surface), strict=True):
-            old[some] = new[nearer]
-        ahead = row_dot(points - feet, surface.normal)
+        ahead, away = row_dot(off, surface.normal), np.linalg.norm(off, axis=1)
         smooth = np.abs(ahead) > AHEAD * away
         side = np.where(smooth & (surface.patch >= 0), ahead, side)
         if not self.is_open.any():

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from ..steps import chunked
 from ..triangles import row_dot
-from .charts import STEEPEST, Charts
+from .charts import PLACES_AT_ONCE, STEEPEST, Charts
 from .field import facing_alike, node_weights, weights_of
 from .indicator import LAYERS, Indicator, solve_poisson
 
@@ -26,7 +26,7 @@ TOLERANCES = 5.0  # A cell is at most this many tolerances.
 OPPOSITE = -0.9  # Two patches are the sides of a wall or gap if the cosine between their normals is less.
 THIN_SHARE = 0.003  # Walls are at least as thick as all but this share of the area is.
 CERTAIN = 5.0  # Two sides that are nearer than this many deviations are no wall or gap.
-PATCHES_AT_ONCE, SAMPLES_AT_ONCE = 20, 3000  # A step takes this many patches, or this many samples.
+PATCHES_AT_ONCE = 20  # A step takes this many patches.
 
 
 def indicated(charts: Charts, tolerance: float | None) -> Generator[float, None, Indicator]:
@@ -75,7 +75,7 @@ def samples_of(charts: Charts, pitch: float) -> Generator[float, None, Samples]:
     patch, x, y, middle, group = yield from _sample_grid(charts, half, across)
     others, thickness = yield from chunked(
         partial(_overlap_weight_and_thickness, charts),
-        SAMPLES_AT_ONCE,
+        PLACES_AT_ONCE,
         0.0,
         patch[middle],
         x[middle],
@@ -83,7 +83,7 @@ def samples_of(charts: Charts, pitch: float) -> Generator[float, None, Samples]:
     )
     flat = ((2.0 * half * charts.radii / across) ** 2)[patch]
     columns = patch, x, y, flat, others[group], thickness[group]
-    return Samples._make((yield from chunked(partial(_samples, charts), SAMPLES_AT_ONCE, 0.0, *columns)))
+    return Samples._make((yield from chunked(partial(_samples, charts), PLACES_AT_ONCE, 0.0, *columns)))
 
 
 def _sample_grid(

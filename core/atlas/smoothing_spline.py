@@ -3,11 +3,10 @@
 """Heights as a smoothing spline through contacts and across normals, as smooth as these show it to be.
 
 Not in the paper. It is a cubic B-spline on SIDE x SIDE knots. Its prior is that of a surface with random
-derivatives of second or third order (Wahba 1990, on knots as by Eilers and Marx 1996): a weathered surface
-has the former, and a smooth one the latter, which leaves quadrics free. The order, the size of these
-derivatives, and the deviations of contacts and normals follow from the marginal likelihood; outlying contacts
-weigh as under a Student t distribution. Equations are banded, however many contacts there are. All is in unit
-radius.
+third derivatives, which leaves quadrics free (Wahba 1990, on knots as by Eilers and Marx 1996). The size of
+these derivatives, and the deviations of contacts and normals follow from the marginal likelihood; outlying
+contacts weigh as under a Student t distribution. Equations are banded, however many contacts there are. All
+is in unit radius.
 """
 
 from collections.abc import Sequence
@@ -19,18 +18,17 @@ import numpy as np
 
 from ..arguments import Array
 from ..lapack import on_one_thread
-from ..patch.monge import exponents, monomials
 from .cubic_spline import CUBIC, SIDE, bases, upsampled
 
 # python -m benchmarks.atlas chose these.
-# The orders of derivatives, each with the grid of their size.
-ROUGHNESS = {2: (0.01, 0.03, 0.1, 0.3, 1.0, 3.0), 3: (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)}
+ORDER = 3  # The order of the random derivatives. With 2 as a choice, patches are 4 % farther off.
+FREE = ORDER * (ORDER + 1) // 2  # This many terms are free.
+ROUGHNESS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # The grid of the derivatives' size.
 NOISE_FACTORS = (1.0, 2.0, 4.0, 8.0)  # The grid of the noise, in units of the least noise.
 SLOPE_STDS = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # The grid of the normals' deviation, which facets have.
-SMOOTHEST, ROUGHEST = 3, 2  # The search begins at the smoothest order.
 START, MIDDLE = 3, 2  # It begins at these places of the grids of roughness and of the normals' deviation.
-PASSES = 2  # If the noise is above its floor, hyperparameters are searched this often.
-CURVATURE_STD = 1.0  # The prior deviation of curvatures, twice that of coefficients of a quadric.
+PASSES = 2  # If the noise is above its floor, hyperparameters are searched this often. With one, a tenth of
+# outlying contacts makes a fit some tens of times worse (test_smoothing_spline).
 FAR_OFF, STUDENT = 3.0, 4.0  # Outliers are off by more deviations, and weigh as under t of this freedom.
 LEAST_COSINE = 0.2  # A normal does not count if the cosine of its angle to the axis is less.
 WIDTH = CUBIC * SIDE + CUBIC  # The width of the band.
@@ -45,9 +43,9 @@ class Spline(NamedTuple):
 
 
 class _Equations(NamedTuple):
-    """Normal equations of heights and slopes of unit deviation, and the prior's matrices.
+    """Normal equations of heights and slopes of unit deviation, and the prior's matrix.
 
-    bands : (4, SIDE^2 (WIDTH + 1)), those of matrices, column by column: of each order, heights, slopes
+    bands : (3, SIDE^2 (WIDTH + 1)), those of matrices, column by column: of the prior, heights, slopes
     rights, squares, counts : (2, SIDE^2), (2,) and (2,), right sides, sums of squares and numbers of data
     """
 
@@ -71,9 +69,8 @@ class _Columns(NamedTuple):
 
 
 class _Hyperparameters(NamedTuple):
-    """The order of the random derivatives, their size, and the deviations of contacts and normals."""
+    """The size of the random derivatives, and the deviations of contacts and normals."""
 
-    order: int
     roughness: float
     noise: float
     slope_std: float
@@ -111,8 +108,8 @@ def smoothing_spline(contacts: Array, normals: Array, weights: Array, half: floa
     heights, slopes = _columns(knots, basis[:1], values[:1]), _columns(knots, basis[1:], values[1:])
     # A slope s has 1 + s^2 times the deviation.
     certainty = np.where(normals[:, 2] > LEAST_COSINE, up**4, 0.0)
-    hyperparameters = _Hyperparameters(SMOOTHEST, ROUGHNESS[SMOOTHEST][START], noise, SLOPE_STDS[MIDDLE])
-    grids = {"slope_std": SLOPE_STDS, "roughness": ROUGHNESS[SMOOTHEST]}
+    hyperparameters = _Hyperparameters(ROUGHNESS[START], noise, SLOPE_STDS[MIDDLE])
+    grids = {"slope_std": SLOPE_STDS, "roughness": ROUGHNESS}
     grids["noise"] = tuple(noise * factor for factor in NOISE_FACTORS)
     equations = _equations([heights, slopes], [weights, weights * certainty])
     for _ in range(PASSES):
@@ -124,10 +121,7 @@ def smoothing_spline(contacts: Array, normals: Array, weights: Array, half: floa
         equations = _equations([heights, slopes], [weights, weights * certainty])
         if hyperparameters.noise == noise:
             break  # Outlying contacts, which make the noise look larger, did not count.
-    # The other order keeps these deviations: intervals hold better than with smaller ones.
-    other = hyperparameters._replace(order=ROUGHEST, roughness=ROUGHNESS[ROUGHEST][START])
-    rough = _ascended(equations, _solved(equations, other, half), "roughness", ROUGHNESS[ROUGHEST], half)
-    best = min(_solved(equations, hyperparameters, half), rough, key=lambda each: each.neg2_log_evidence)
+    best = _solved(equations, hyperparameters, half)
     return Spline(best.coefficients().reshape(SIDE, SIDE), _stds(best.factor))
 
 
@@ -138,7 +132,7 @@ def _equations(columns: Sequence[_Columns], weights: Sequence[Array]) -> _Equati
         for some, w in zip(columns, weights, strict=True)
     ]
     bands, *others = (np.array(values) for values in zip(*sums, strict=True))
-    return _Equations(np.vstack([*(penalty(order)[0] for order in ROUGHNESS), bands]), *others)
+    return _Equations(np.vstack([penalty(), bands]), *others)
 
 
 def _ascended(
@@ -163,21 +157,16 @@ def _solved(equations: _Equations, hyperparameters: _Hyperparameters, half: floa
     """The penalized least squares solution for given hyperparameters, by a banded Cholesky factor L L' = A.
 
     neg2_log_evidence is y'y - |L^-1 b|^2 + log |A| - log |prior precision| and the terms of the noise, in
-    unit radius.
+    unit radius, up to a constant.
     """
     from scipy.linalg import cholesky_banded
 
-    _, log_determinant, log_free = penalty(hyperparameters.order)
-    pitch, free = 2.0 * half / (SIDE - 1), hyperparameters.order * (hyperparameters.order + 1) // 2
-    precision = pitch ** (2 - 2 * hyperparameters.order) / hyperparameters.roughness**2
-    neg2_log_evidence = -log_determinant - (SIDE**2 - free) * np.log(precision)
-    # What an order leaves free has a flat prior: for quadrics it is as high as the Gaussian of their
-    # coefficients is at 0, so that both orders compare.
-    neg2_log_evidence += 2.0 * (log_free + (free - 3) * np.log(0.5 * CURVATURE_STD * half**2))
+    pitch = 2.0 * half / (SIDE - 1)
+    precision = pitch ** (2 - 2 * ORDER) / hyperparameters.roughness**2
     stds = np.array([hyperparameters.noise, hyperparameters.slope_std])
-    neg2_log_evidence += equations.squares @ stds**-2.0 + 2.0 * equations.counts @ np.log(stds)
-    priors = [precision if order == hyperparameters.order else 0.0 for order in ROUGHNESS]
-    matrix = (np.array([*priors, *stds**-2.0]) @ equations.bands).reshape(SIDE**2, WIDTH + 1).T
+    neg2_log_evidence = equations.squares @ stds**-2.0 + 2.0 * equations.counts @ np.log(stds)
+    neg2_log_evidence -= (SIDE**2 - FREE) * np.log(precision)
+    matrix = (np.array([precision, *stds**-2.0]) @ equations.bands).reshape(SIDE**2, WIDTH + 1).T
     matrix[0] += SPLINE_ROUNDING * matrix[0].max()
     factor = cholesky_banded(matrix, overwrite_ab=True, lower=True, check_finite=False)
     whitened = _triangular(factor, stds**-2.0 @ equations.rights, "N")
@@ -233,23 +222,17 @@ def _heights_at_coarse_knots() -> Array:
 
 
 @cache
-def penalty(order: int) -> tuple[Array, float, float]:
-    """The sum of squares of all derivatives of an order, by differences, for knots at distance 1.
-
-    Returns its band; the log of the product of its eigenvalues above 0; and the log of the volume that the
-    terms x^2, xy and y^2 on [-1, 1]^2 span beyond planes, or 0 if this order does not leave them free.
-    """
+def penalty() -> Array:
+    """The band of the sum of squares of all derivatives of the ORDER, by differences, for knots 1 apart."""
     from scipy.sparse import csr_matrix, kron
 
-    steps = [csr_matrix(np.diff(np.eye(SIDE), k, axis=0)) for k in range(order + 1)]
-    matrix = sum(
-        comb(order, k) * kron(a.T @ a, b.T @ b)
-        for k, (a, b) in enumerate(zip(steps[::-1], steps, strict=True))
+    steps = [csr_matrix(np.diff(np.eye(SIDE), k, axis=0)) for k in range(ORDER + 1)]
+    return _band(
+        sum(
+            comb(ORDER, k) * kron(a.T @ a, b.T @ b)
+            for k, (a, b) in enumerate(zip(steps[::-1], steps, strict=True))
+        )
     )
-    grid = np.stack(np.meshgrid(*2 * [np.linspace(-1.0, 1.0, SIDE)], indexing="ij"), axis=-1)
-    basis, volumes = np.linalg.qr(monomials(grid.reshape(-1, 2), exponents(0, order - 1)))
-    log_determinant = float(np.linalg.slogdet(matrix.toarray() + basis @ basis.T)[1])
-    return _band(matrix), log_determinant, float(np.log(np.abs(np.diag(volumes)[3:])).sum())
 
 
 def _band(matrix: Any) -> Array:

@@ -18,15 +18,14 @@ from ..exploration.extent import Exploration
 from ..exploration.options import ExplorationOptions
 from ..exploration.side_by_side import exploring_many
 from ..steps import part_of, result_of
-from ..triangles import row_dot
+from ..triangles import far_apart, row_dot
 from .borders import felt_border, snapped_to_border
 from .charts import Charts
 from .field import covered
 from .finger import FACING, finger_at
 from .frontier import Frontier
-from .join import Table, blend_heights, refit
-from .meshing import Mesh
-from .object_atlas import LIMIT, Atlas, Check, joined_surface
+from .join import Table, refit
+from .object_atlas import Atlas, Check, joined_surface
 from .reference_mesh import ReferenceMesh
 
 # python -m benchmarks.atlas judges these.
@@ -38,7 +37,7 @@ SMALL = 5.0  # Touches do not go on from a patch whose radius is below this many
 NARROW = 1.0  # Where a touch was in vain before, a patch needs a radius of only this many tolerances.
 SIDE_BY_SIDE = 8  # This many touches at once are faster, and still done in a tenth of a second.
 NEAR = 3.0  # A patch ends where the surface is off it by more tolerances.
-AGAIN = 5  # Where something is missing or less certain, touches go on at most this often.
+AGAIN = 5  # Where something is missing, touches go on at most this often.
 CHECKS, CHECK_SEED = 512, 0  # This many rays from outside check the surface.
 HAIR = 0.01  # Rays begin this share of their length above the surface, which they would meet.
 SHARPEST, SPIKES = 64, 16  # This many go to its sharpest vertices, and to the triangles around the sharpest.
@@ -259,14 +258,8 @@ class _Run:
         points, normals = (np.array(values) for values in zip(*contacts, strict=True))
         left, first = np.arange(len(points)), len(self.found)
         while len(left) and self.done < self.most and not self.is_stopped:
-            few: list[int] = []
-            for i in left.tolist():
-                apart = np.linalg.norm(points[few] - points[i], axis=1)
-                if (
-                    len(few) < min(SIDE_BY_SIDE, self.most - self.done)
-                    and (apart > AGAIN_APART * farthest).all()
-                ):
-                    few.append(i)
+            few = left[far_apart(points[left], AGAIN_APART * farthest)]
+            few = few[: min(SIDE_BY_SIDE, self.most - self.done)]
             some = list(zip(points[few], normals[few], strict=True))
             new = yield from self.showing(self.touching(some, farthest, [NARROW] * len(some)))
             left = np.setdiff1d(left, few)
@@ -303,13 +296,12 @@ class _Run:
     def atlas(
         self, earlier: dict[int, tuple[int, Table]]
     ) -> Generator[float, None, tuple[Atlas, list[PointNormal]]]:
-        """The atlas of what was found so far, and contacts where something is missing or less certain.
+        """The atlas of what was found so far, and contacts where something is missing.
 
-        These are where the joined surface ends though the object goes on, where a finger from outside meets
-        something else, and where the surface is less certain than the tolerance.
+        These are where the joined surface ends though the object goes on, and where a finger from outside
+        meets something else.
         """
         charts = yield from part_of(self.joining(earlier), 0.0, JOINED)
-        charts = yield from part_of(blend_heights(charts), 0.0, JOINED)
         patches = tuple(e.result for e in self.found)
         reference = yield from part_of(joined_surface(patches, charts, self.tolerance, self.off), JOINED, 1.0)
         yield 1.0
@@ -333,7 +325,7 @@ class _Run:
         atlas = yield from atlas.widened()
         contacts: list[PointNormal] = [contact for _, contact in uncovered]
         contacts += zip(check.points[off], check.normals[off], strict=True)
-        return atlas, contacts + (self.uncertain_contacts(atlas.reference.mesh) if atlas.is_rough else [])
+        return atlas, contacts
 
     def off(self, points: Array, normals: Array) -> Array:
         """How far the object is off places (n, 3) with normals (n, 3), (n,); inf beyond the tolerance.
@@ -346,19 +338,6 @@ class _Run:
             math.inf if contact is None else math.dist(place[0], contact[0])
             for place, contact in zip(places, contacts, strict=True)
         ])  # fmt: skip
-
-    def uncertain_contacts(self, mesh: Mesh) -> list[PointNormal]:
-        """Contacts where the surface is less certain than LIMIT tolerances, apart from each other."""
-        left, normals = np.flatnonzero(mesh.std > LIMIT * self.tolerance), mesh.normals
-        contacts: list[PointNormal] = []
-        while len(left):
-            worst = left[np.argmax(mesh.std[left])]
-            point, normal = vector_of(mesh.vertices[worst]), vector_of(normals[worst])
-            contact = self.frontier.finger.near(point, normal, self.frontier.near)
-            contacts += [contact] if contact else []
-            apart = AGAIN_APART * self.frontier.charts.radii[mesh.patch[worst]]
-            left = left[((mesh.vertices[left] - mesh.vertices[worst]) ** 2).sum(axis=1) > apart**2]
-        return contacts
 
 
 def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], float]:
@@ -396,7 +375,7 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
 
 
 def _joined_and_refined(run: _Run) -> Steps:
-    """The atlas of what was found, after more touches where something is missing or less certain."""
+    """The atlas of what was found, after more touches where something is missing."""
     earlier: dict[int, tuple[int, Table]] = {}
     for again in range(AGAIN, -1, -1):
         atlas, contacts = yield from run.showing(run.atlas(earlier))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, many
+from ..triangles import far_apart
 from .contour import Contour, contours_of
 from .curves import (
     LEAST_CONTACTS,
@@ -86,13 +87,9 @@ def _starts(contours: Sequence[Contour]) -> Array:
     contacts = np.vstack(thinned)
     contacts = contacts[:: -(-len(contacts) * len(thinned) // MAX_QUERIES)]
     squares = np.sum([cKDTree(points).query(contacts)[0] ** 2 for points in thinned], axis=0)
-    apart, starts = MAX_OFFSET * min(contour.size for contour in contours), np.empty((0, 3))
-    left = squares <= 4.0 * squares.min() + len(contours) * apart**2
-    while len(starts) < MOST_STARTS and left.any():
-        best = contacts[np.argmin(np.where(left, squares, np.inf))]
-        starts = np.vstack([starts, best])
-        left &= np.linalg.norm(contacts - best, axis=1) > 2.0 * apart
-    return starts
+    apart, order = MAX_OFFSET * min(contour.size for contour in contours), np.argsort(squares, kind="stable")
+    near = contacts[order[squares[order] <= 4.0 * squares.min() + len(contours) * apart**2]]
+    return near[far_apart(near, 2.0 * apart)[:MOST_STARTS]]
 
 
 def _refined(point: Array, contours: Sequence[Contour]) -> tuple[Array, Array, Array]:

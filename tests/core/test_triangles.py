@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from core.triangles import closest_point, cut_to_edges, middles_of_parts
+from core.triangles import closest_point, cut_to_edges, far_apart, middles_of_parts
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 7])
@@ -44,3 +44,14 @@ def test_triangles_are_cut_by_their_edges_and_not_by_other_columns():
     assert np.linalg.norm((cut - np.roll(cut, 1, axis=1))[..., :3], axis=2).max() <= 0.1
     assert points[3:] == pytest.approx(points[3:, :3] @ np.linalg.inv(corners[:, :3]) @ corners)
     assert (whole == 0).all()
+
+
+def test_points_that_are_far_apart_leave_none_out_that_is_far_from_them():
+    rng = np.random.default_rng(0)
+    points, lengths = rng.uniform(size=(300, 3)), rng.uniform(0.1, 0.4, 300)
+    chosen = far_apart(points, lengths)
+    away = np.linalg.norm(points[:, None] - points[chosen], axis=2)
+    for i in range(300):
+        before = [k for k, j in enumerate(chosen) if j < i]
+        assert (i in chosen) == (away[i, before] > lengths[chosen][before]).all()
+    assert far_apart(points[:0], 1.0) == [] and far_apart(points, 9.0) == [0]

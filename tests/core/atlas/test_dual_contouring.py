@@ -1,14 +1,13 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lattice and its topology, vertices where planes meet, and triangles whose edges are split."""
+"""The lattice and its topology, and vertices where planes meet."""
 
 import numpy as np
 import pytest
 from scipy.ndimage import label
 
 import core
-from core.atlas.connectivity import split_sides
-from core.atlas.dual_contouring import _held, _on_sheet, _sides, _vertices, dual_contour
+from core.atlas.dual_contouring import _on_sheet, _sides, _vertices, dual_contour
 from core.atlas.field import Blend
 from core.atlas.indicator import Indicator
 from core.atlas.join import charts_of
@@ -151,21 +150,6 @@ def test_a_lattice_that_is_composed_stays():
     assert np.array_equal(again.turned, lattice.turned)
 
 
-def test_what_is_held_in_a_box_is_the_least_there():
-    rng = np.random.default_rng(0)
-    factors, right = rng.normal(size=(50, 3, 3)), rng.normal(size=(50, 3))
-    square = factors @ np.swapaxes(factors, 1, 2) + 0.3 * np.eye(3)
-    low, high = np.full((50, 3), -0.2), np.full((50, 3), 0.3)
-    x = _held(square, right, low, high)
-
-    def value(at):
-        return 0.5 * np.einsum("ni,nij,nj->n", at, square, at) - np.einsum("ni,ni->n", right, at)
-
-    assert (x >= low).all() and (x <= high).all()
-    for _ in range(300):
-        assert (value(x) <= value(rng.uniform(low, high)) + 1e-3).all()
-
-
 @pytest.fixture(scope="module")
 def block():
     options = {"tolerance": 8e-3, "noise": 1e-3, "rng": 0}
@@ -206,23 +190,3 @@ def test_points_beside_a_crease_are_inside_though_the_indicator_has_them_outside
     distance, std = block.distance(points)
     assert np.quantile(np.abs(distance), 0.95) < 0.25 * 8e-3
     assert np.isfinite(std).all()
-
-
-def octahedron():
-    vertices = np.vstack([np.eye(3), -np.eye(3)])
-    triangles = [(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)]
-    return vertices, np.array(triangles)
-
-
-@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 1.0])
-def test_split_sides_leave_the_same_surface_without_a_gap(share):
-    """Cases of one, two and three split sides of a triangle occur, and each vertex is on its side."""
-    vertices, triangles = octahedron()
-    sides = np.unique(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-    sides = sides[np.random.default_rng(0).random(len(sides)) < share]
-    found = split_sides(triangles, sides, len(vertices))
-    more = np.vstack([vertices, vertices[sides].mean(axis=1)])
-    assert solids.topology(found) == solids.Topology(0, 0, 2, 1)
-    assert len(found) == len(triangles) + 2 * len(sides)
-    a, b, c = more[found].transpose(1, 0, 2)
-    assert np.einsum("ni,ni->", np.cross(a, b), c) / 6.0 == pytest.approx(4.0 / 3.0)
