@@ -6,7 +6,7 @@ import numpy as np
 
 from ..arguments import Array
 from ..contours.contour import tangent_of, vector_of
-from ..triangles import triangle_cross
+from ..triangles import far_apart, triangle_cross
 from .charts import Charts
 from .frontier import RimPlace
 from .reference_mesh import ReferenceMesh
@@ -28,9 +28,9 @@ def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[RimPlace
     """
     from scipy.spatial import cKDTree
 
-    mesh, unfelt, places = reference.mesh, reference.unfelt, list[RimPlace]()
+    mesh, unfelt = reference.mesh, reference.unfelt
     if unfelt is None or not reference.is_open.any():
-        return tuple(places)
+        return ()
     which = reference.is_open & mesh.normals.any(axis=1)  # Triangles without an area have no normal.
     rim, ups = mesh.vertices[which], mesh.normals[which]
     radii = charts.radii[cKDTree(charts.origins).query(rim)[1]]
@@ -39,9 +39,6 @@ def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[RimPlace
     areas = np.bincount(unfelt.triangles.ravel(), areas, len(unfelt.vertices))
     around = cKDTree(unfelt.vertices).query_ball_point(rim, radii)
     gains = np.minimum([areas[near].sum() for near in around], np.pi * radii**2)
-    left = np.arange(len(rim))
-    while len(left):
-        best = left[np.argmax(gains[left])]
-        places.append(place_at(rim[best], ups[best], float(radii[best]), float(gains[best])))
-        left = left[np.linalg.norm(rim[left] - rim[best], axis=1) > APART * radii[best]]
-    return tuple(places)
+    order = np.argsort(-gains, kind="stable")
+    some = order[far_apart(rim[order], APART * radii[order])]
+    return tuple(place_at(rim[i], ups[i], float(radii[i]), float(gains[i])) for i in some)
