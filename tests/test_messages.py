@@ -39,7 +39,7 @@ def sentences(node):
         name = getattr(node.func, "id", None) or getattr(node.func, "attr", None)
         return node.args[:1] if name in ERRORS else node.args[1:2] if name in REPORTS else []
     if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple):
-        return node.value.elts[1:] if isinstance(node.value.elts[0], ast.Constant) else []
+        return node.value.elts[1:] if isinstance(next(iter(node.value.elts), None), ast.Constant) else []
     if isinstance(node, ast.Yield):
         return [node.value]
     if isinstance(node, ast.Assign) and getattr(node.targets[0], "attr", None) == "message":

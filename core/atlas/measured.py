@@ -294,18 +294,20 @@ def _agreement(
 
     noise : that of the fit, or 0 if one was given
     """
-    noise_text = f" No noise was given; that of the fit is {noise:.2g}." if noise else ""
-    if not far.any():
-        return [], f"The surface is closed, and all contacts agree with it.{noise_text}"
-    place = place_text(contacts.points[worst[:1]])
-    count, most = np.count_nonzero(far), float(distances[far].max())
-    if far.mean() > FEW or len(worst) > len(QUADRIC) or most > limit:
-        code = "confused" if is_turned[worst].any() else "off_surface"
-        return [Doubt(code, most, words=(f"{count} of {len(far)} contacts", place))], ""
-    return [], (
-        f"The surface is closed. All but {count} of {len(far)} contacts agree with it, which are off by up "
-        f"to {most:.2g}, most together around {place}.{noise_text}"
-    )
+    message = "The surface is closed, and all contacts agree with it."
+    if far.any():
+        place = place_text(contacts.points[worst[:1]])
+        count, most = np.count_nonzero(far), float(distances[far].max())
+        if far.mean() > FEW or len(worst) > len(QUADRIC) or most > limit:
+            code = "confused" if is_turned[worst].any() else "off_surface"
+            return [Doubt(code, most, words=(f"{count} of {len(far)} contacts", place))], ""
+        message = (
+            f"The surface is closed. All but {count} of {len(far)} contacts agree with it, which are off by "
+            f"up to {most:.2g}, most together around {place}."
+        )
+    if noise:
+        message += f" No noise was given; that of the fit is {noise:.2g}."
+    return [], message
 
 
 class _Cloud(NamedTuple):

@@ -213,7 +213,7 @@ def test_normals_that_contradict_each_other_are_refused_before_anything_is_joine
     half = [Contour(points[i::2], normals=(1 - 2 * i) * normals[i::2]) for i in (0, 1)]
     paths = [write(f"half{i}.csv", [some]) for i, some in enumerate(half)]
     before = datablocks(empty)
-    sentence = "ormals: expected those of neighboring contacts on one side, got opposite ones at 29"
+    sentence = "ormals: expected those of neighboring contacts on one side, got opposite ones around "
     with pytest.raises(RuntimeError, match=sentence):
         joined(empty, paths)
     assert datablocks(empty) == before
