@@ -107,3 +107,29 @@ def test_strokes_that_are_too_far_apart_for_a_wall_are_a_doubt_that_names_a_plac
     assert re.search(
         r"(most together|each other) around \(.*\).* strokes are (too far|farther) apart", atlas.message
     )
+
+
+def thin_plate(thickness):
+    """Random contacts all over a plate of 1 by .8, and its normals."""
+    rng = np.random.default_rng(0)
+    half = 0.5 * np.array([1.0, 0.8, thickness])
+    areas = half.prod() / half
+    axis = rng.choice(3, 1500, p=areas / areas.sum())
+    normals = np.eye(3)[axis] * rng.choice([-1.0, 1.0], (1500, 1))
+    points = np.where(normals, normals, rng.uniform(-1.0, 1.0, (1500, 3))) * half
+    return points, normals
+
+
+@pytest.mark.parametrize("thickness", [0.1, 0.03, 0.01])
+def test_the_two_sides_of_a_thin_plate_do_not_contradict_each_other(thickness):
+    points, normals = thin_plate(thickness)
+    assert not list(doubts_of(points, normals, planes_of(points, 0.0).links))
+
+
+@pytest.mark.parametrize(("share", "count"), [(0.005, 0), (0.02, 1)])
+def test_normals_contradict_each_other_if_more_than_a_fiftieth_of_neighbors_do(share, count):
+    points, normals = thin_plate(0.3)
+    normals[: int(share * len(normals))] *= -1.0
+    found = list(doubts_of(points, normals, planes_of(points, 0.0).links))
+    assert len(found) == count
+    assert [doubt.value for doubt in found] == pytest.approx([2.0 * share] * count, rel=0.2)
