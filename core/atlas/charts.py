@@ -25,6 +25,7 @@ REACH = 0.5  # A patch is evaluated at places up to this share of its radius abo
 # Weights of four neighbors (Catmull and Rom 1974), by the share of the way between the middle two.
 CATMULL_ROM = np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]]) / 2.0
 ASIDE = 0.3  # What is farther than this share of the radius off the normal at its foot has no foot.
+FLAT = 0.15  # A patch is flat if it is nowhere steeper than this slope to its own plane.
 STEEPEST = 0.4  # Where a patch is steeper, this cosine to its own plane, it has no feet: heights run away.
 PLACES_AT_ONCE = 3000  # A step takes this many places.
 CHUNK = 24_000  # This many pairs of a place and a patch fit into the processor's cache at once.
@@ -186,24 +187,42 @@ class Charts:
         return map_coordinates(self.stds, at, order=1, mode="nearest")
 
     @cached_property
-    def mean_stds(self) -> Array:
-        """The mean deviation of the heights over each domain, (n,), a length."""
+    def inside(self) -> NDArray[np.bool_]:
+        """Which knots are in the domain, (n, SIDE, SIDE)."""
         along = self.halves[:, None] * np.linspace(-1.0, 1.0, SIDE)
         x, y = (axis.ravel() for axis in np.broadcast_arrays(along[:, :, None], along[:, None]))
         patch = np.repeat(np.arange(len(self.radii)), SIDE**2)
-        inside = self.shares(x, y, patch).reshape(self.stds.shape) <= 1.0
-        means: Array = (self.stds * inside).sum(axis=(1, 2)) / np.maximum(inside.sum(axis=(1, 2)), 1)
+        return self.shares(x, y, patch).reshape(self.stds.shape) <= 1.0
+
+    @cached_property
+    def mean_stds(self) -> Array:
+        """The mean deviation of the heights over each domain, (n,), a length."""
+        means: Array = (self.stds * self.inside).sum(axis=(1, 2))
+        means /= np.maximum(self.inside.sum(axis=(1, 2)), 1)
         return self.radii * means
+
+    @cached_property
+    def is_flat(self) -> NDArray[np.bool_]:
+        """Which patches are flat, (n,), by the slopes between neighboring knots of their domains."""
+        pitch = (2.0 * self.halves / (SIDE - 1))[:, None, None]
+        steps = np.stack([self.heights[:, 1:, :-1], self.heights[:, :-1, 1:]]) - self.heights[:, :-1, :-1]
+        steep = (np.hypot(*steps) > FLAT * pitch) & self.inside[:, :-1, :-1]
+        return ~steep.any(axis=(1, 2))
 
     def widened(self, factor: float) -> "Charts":
         """Tables of these patches whose deviations are larger by a factor."""
-        return replace(self, stds=factor * self.stds)
+        wider = replace(self, stds=factor * self.stds)
+        vars(wider)["is_flat"] = self.is_flat  # where cached_property looks: it does not depend on these
+        return wider
 
     def joined(self, others: "Charts") -> "Charts":
         """The tables of these patches, followed by others."""
-        return Charts(
+        both = Charts(
             *(np.concatenate([getattr(self, f.name), getattr(others, f.name)]) for f in fields(Charts))
         )
+        # Otherwise each touch would look at the knots of all patches before it again.
+        vars(both)["is_flat"] = np.append(self.is_flat, others.is_flat)
+        return both
 
     def rim_at(self, azimuths: NDArray[np.intp]) -> Array:
         """Local x and y (2, k) of the first patch's rim, at some of its AZIMUTHS."""

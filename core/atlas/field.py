@@ -18,10 +18,10 @@ from .charts import MARGIN, Charts, Pairs
 # python -m benchmarks.atlas judges these.
 OUTERMOST = 0.999  # Weights beyond this share of MARGIN are those there, so that none is 0.
 FLOOR = 1e-3  # No deviation below this share of the radius counts in a weight.
-# The cosines of 30 and of 41 degrees: patches that turn by less are one sheet, from there on they fade out of
-# it, and those that turn by more are another sheet. With 37 and 53 walls that meet at 45 degrees are a third
-# farther off.
-AGREE, APART = 0.87, 0.75
+# The cosines of 37 and of 53 degrees: patches that turn by less are one sheet, from there on they fade out of
+# it, and those that turn by more are another sheet.
+AGREE, APART = 0.8, 0.6
+FLAT_AGREE, FLAT_APART = 0.87, 0.75  # Those of flat patches, of 30 and 41 degrees: these end where sheets do.
 # Patches of one sheet differ in distance by at most this share of the radius, and this share of the distance
 # more.
 LAYER, SLANT = 0.15, 0.5
@@ -75,12 +75,15 @@ def facing_alike(charts: Charts, pairs: Pairs, up: Array, offset: Array, radius:
     radius : (m,), that of a patch of the sheet
     """
     band = LAYER * np.maximum(charts.radii[pairs.patch], radius) + SLANT * np.abs(offset)
-    return _facing(pairs, up) * _within(pairs.distance - offset, band)
+    return _facing(charts, pairs, up) * _within(pairs.distance - offset, band)
 
 
-def _facing(pairs: Pairs, up: Array) -> Array:
+def _facing(charts: Charts, pairs: Pairs, up: Array) -> Array:
     """From 1 to 0, (m,), how much patches face the way of normals (m, 3)."""
-    agree: Array = np.clip((row_dot(pairs.normal, up) - APART) / (AGREE - APART), 0.0, 1.0)
+    cosine: Array = row_dot(pairs.normal, up)
+    is_flat = charts.is_flat[pairs.patch]
+    apart, most = np.where(is_flat, FLAT_APART, APART), np.where(is_flat, FLAT_AGREE, AGREE)
+    agree: Array = np.clip((cosine - apart) / (most - apart), 0.0, 1.0)
     return agree * (agree * (3.0 - 2.0 * agree))
 
 
@@ -93,7 +96,7 @@ def _within(off: Array, band: Array) -> Array:
 def sheet_facing(charts: Charts, points: Array, up: Array, near: Array | float) -> Blend:
     """The sheet with normals `up` (k, 3) near places (k, 3), of patches within a length (k,)."""
     pairs, near = charts.pairs(points, float(np.max(near, initial=0.0))), np.broadcast_to(near, len(points))
-    alike = _facing(pairs, up[pairs.point_index]) * _within(pairs.distance, near[pairs.point_index])
+    alike = _facing(charts, pairs, up[pairs.point_index]) * _within(pairs.distance, near[pairs.point_index])
     return _weighted_mean(pairs, node_weights(charts, pairs) * alike, len(points))
 
 
@@ -122,7 +125,7 @@ def covered(
     """
     pairs = charts.pairs(points)
     near = np.abs(pairs.distance) < LAYER * charts.radii[pairs.patch]
-    on = (pairs.rho < share) & near & (_facing(pairs, normals[pairs.point_index]) > 0.0)
+    on = (pairs.rho < share) & near & (_facing(charts, pairs, normals[pairs.point_index]) > 0.0)
     on &= pairs.patch >= first
     return np.bincount(pairs.point_index[on], minlength=len(points)) > 0
 
