@@ -410,7 +410,8 @@ class _Cloud(NamedTuple):
             np.minimum(away / self.contacts.reach[mine], to_other / self.contacts.reach[other]) < AT_EDGE
         )
         is_edge = is_beyond & is_near.reshape(rays.shape)
-        return np.where(is_edge[end, every], low, np.minimum(low, domain))
+        rim = np.where(is_edge[end, every], low, np.minimum(low, domain))
+        return np.maximum(rim, float(RAY_PLACES) ** -RAY_ROUNDS)  # Rays do not show less, and none is 0.
 
     def longest_sure(self, i: int, radii: list[float], last: int) -> tuple[Reconstruction | None, int]:
         """The largest sure patch around contact i, or None; which radius it has.
