@@ -735,3 +735,10 @@ def test_a_ball_that_is_larger_than_its_centers_bend_is_a_doubt():
     atlas = core.atlas_of(centers)
     assert atlas.status == "uncertain"
     assert "bend more than a ball of this radius can" in atlas.message
+
+
+@pytest.mark.parametrize("jitter", [1e-14, 1e-6])
+def test_a_finger_that_rests_at_one_place_breaks_no_atlas(jitter):
+    rest = np.array([1.0, 0.0, 0.0]) + np.random.default_rng(5).normal(0.0, jitter, (800, 3))
+    atlas = core.atlas_of([np.vstack([ball(800), rest])])
+    assert np.abs(np.linalg.norm(atlas.reference.mesh.vertices, axis=1) - 1.0).max() < 0.05
