@@ -234,8 +234,9 @@ class PlacedMesh:
         return x + self._at[0], y + self._at[1], z + self._at[2]
 
     def _to_local(self, point: Point) -> Triple:
-        x, y, z = self._at
-        return product(self._inverse_rows, point[0] - x, point[1] - y, point[2] - z)
+        return product(
+            self._inverse_rows, point[0] - self._at[0], point[1] - self._at[1], point[2] - self._at[2]
+        )
 
     def _normal_to_world(self, normal: Point) -> Triple:
         """The normal by the inverse transpose: it stays outward under any scale, even one that mirrors."""
