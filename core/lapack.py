@@ -103,7 +103,10 @@ def solved_definite(matrix: Array, right: Array) -> Array:
 @on_one_thread
 def solved_square(matrix: Array, right: Array) -> Array:
     """matrix^-1 @ right, for an invertible matrix (m, m) and right (m, n)."""
-    return _lapack().dgesv(matrix, right)[2]
+    *_, solution, failed = _lapack().dgesv(matrix, right)
+    if failed:
+        raise np.linalg.LinAlgError("the matrix is singular")
+    return solution
 
 
 @on_one_thread

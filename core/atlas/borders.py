@@ -243,7 +243,7 @@ def _welded(mesh: Mesh) -> Mesh:
 
 
 def _cornered(mesh: Mesh, corners: Array) -> Mesh:
-    """The mesh with the nearer end of the side of its border that passes a corner (n, 3) by at the corner."""
+    """The mesh whose border has a vertex at corners (n, 3): the nearer end of the side that passes one by."""
     sides, vertices, row = mesh.border, mesh.vertices.copy(), np.arange(len(corners))
     ends = vertices[sides]
     away = np.linalg.norm(corners[:, None, None] - ends, axis=3)

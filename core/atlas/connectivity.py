@@ -39,7 +39,7 @@ def graph_of(links: Indices) -> Any:
 
 
 def pieces_of(graph: Any, some: Indices) -> Indices:
-    """The connected component (m,) of each of some nodes of a graph, by the links between these alone."""
+    """The connected component (m,) of each of some nodes of a graph, by the links among these only."""
     from scipy.sparse.csgraph import connected_components
 
     pieces: Indices = connected_components(graph[some][:, some], directed=False)[1]

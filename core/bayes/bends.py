@@ -158,6 +158,7 @@ def _even(of: _Turns) -> Array:
 
     Beyond the ends of a curve its last steps follow in reverse order.
     """
+    # scipy 1.15's median_filter is 0 for three values or fewer, and takes twice as long.
     rates, half = of.turns / np.maximum(of.steps, SMALLEST), STEPS_AROUND // 2
     start, last = of.curve.searchsorted(of.curve)[:, None], np.bincount(of.curve)[of.curve][:, None] - 1
     around = np.arange(len(rates))[:, None] - start + np.arange(-half, half + 1)

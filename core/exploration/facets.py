@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import SMALLEST, Array
-from ..contours.contour import cross
+from ..contours.contour import cross, read_only
 from ..patch.differential_geometry import Derivatives
 from ..reconstruction.result import Reconstruction
 
@@ -60,7 +60,7 @@ def with_facets(r: Reconstruction, surface: object) -> Reconstruction:
     radius. A facet whose edges are all sharp or those of fillets, as that of a cube, is the shape itself.
     """
     shape = _shape_curvatures(r, surface) if isinstance(surface, FacetedSurface) else None
-    return r.judged_with(shape_curvatures=np.array(shape)) if shape else r
+    return r.judged_with(shape_curvatures=read_only(np.array(shape))) if shape else r
 
 
 def _shape_curvatures(r: Reconstruction, mesh: FacetedSurface) -> list[Array]:

@@ -360,7 +360,7 @@ class Reconstruction(Judged):
         )
 
     def judged_with(self, **values: object) -> "Reconstruction":
-        """The same fit with other values that only its verdict depends on: `taps`, `shape_curvatures`.
+        """This fit with other values that only its verdict depends on: `taps`, `shape_curvatures`.
 
         What follows from the fit alone is kept; `mean_height_std` may be given if it is known.
         """

@@ -24,6 +24,8 @@ def test_agrees_with_numpy():
     np.testing.assert_allclose(lapack.solved(lower, RIGHT), np.linalg.solve(lower, RIGHT))
     np.testing.assert_allclose(lapack.solved(lower, RIGHT, transposed=True), np.linalg.solve(lower.T, RIGHT))
     np.testing.assert_allclose(lapack.solved_definite(MATRIX.copy(), RIGHT), np.linalg.solve(MATRIX, RIGHT))
+    with pytest.raises(np.linalg.LinAlgError, match="the matrix is singular"):
+        lapack.solved_square(np.ones((3, 3)), np.ones((3, 1)))
     np.testing.assert_allclose(lapack.solved_square(MATRIX, MATRIX[:, :2]), np.eye(12)[:, :2], atol=1e-12)
     np.testing.assert_allclose(lapack.inverse_lower(lower.copy()), np.linalg.inv(lower), atol=1e-12)
 

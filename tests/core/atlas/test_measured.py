@@ -203,10 +203,8 @@ def test_no_patch_spans_a_notch_whose_walls_were_felt():
 def test_a_patch_does_not_explain_what_the_noise_hides_from_single_contacts_but_not_from_their_mean():
     contacts = angle_atlas().contacts
     tree = cKDTree(contacts.points)
-    cloud, (_, i) = (
-        measured._Cloud(contacts, tree, graph_of(contacts.links), 5e-4, None),
-        tree.query((0.2, 0.7, 0.4)),
-    )
+    cloud = measured._Cloud(contacts, tree, graph_of(contacts.links), 5e-4, None)
+    _, i = tree.query((0.2, 0.7, 0.4))
     (r,), some = cloud.patches([i], 0.3), cloud.same_sheet(i, 0.3)
     near, up = np.unique(contacts.links[i]), contacts.normals[i]
     for which, height, is_explained in (
@@ -223,10 +221,8 @@ def test_a_patch_does_not_explain_what_the_noise_hides_from_single_contacts_but_
 def test_a_patch_goes_on_from_its_last_contact_to_the_edge_of_its_wall():
     contacts = angle_atlas().contacts
     tree = cKDTree(contacts.points)
-    cloud, (_, i) = (
-        measured._Cloud(contacts, tree, graph_of(contacts.links), 5e-4, None),
-        tree.query((0.1, 0.3, 0.4)),
-    )
+    cloud = measured._Cloud(contacts, tree, graph_of(contacts.links), 5e-4, None)
+    _, i = tree.query((0.1, 0.3, 0.4))
     (r,) = cloud.patches([i], 0.15)
     toward_edge = np.array([-1.0, 0.0, 0.0]) @ r.frame.axes
     turn = np.arctan2(toward_edge[1], toward_edge[0]) / (2.0 * np.pi)
