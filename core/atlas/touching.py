@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, number, unit_vector
 from ..contours.contour import Vector, along, cross, dot, scaled, tangent_of, vector_of
-from ..contours.finger import Surface, contact_of
+from ..contours.finger import Contact, Surface, contact_of
 from ..contours.tracking import generator_of
 from ..exploration.extent import Exploration
 from ..exploration.options import ExplorationOptions
@@ -25,7 +25,8 @@ from .field import covered
 from .finger import FACING, finger_at
 from .frontier import Frontier
 from .join import Table, refit
-from .object_atlas import Atlas, Check, joined_surface
+from .meshing import Mesh
+from .object_atlas import LIMIT, Atlas, Check, joined_surface
 from .reference_mesh import ReferenceMesh
 
 # python -m benchmarks.atlas judges these.
@@ -37,7 +38,7 @@ SMALL = 5.0  # Touches do not go on from a patch whose radius is below this many
 NARROW = 1.0  # Where a touch was in vain before, a patch needs a radius of only this many tolerances.
 SIDE_BY_SIDE = 8  # This many touches at once are faster, and still done in a tenth of a second.
 NEAR = 3.0  # A patch ends where the surface is off it by more tolerances.
-AGAIN = 5  # Where something is missing, touches go on at most this often.
+AGAIN = 5  # Where something is missing or less certain, touches go on at most this often.
 CHECKS, CHECK_SEED = 512, 0  # This many rays from outside check the surface.
 HAIR = 0.01  # Rays begin this share of their length above the surface, which they would meet.
 SHARPEST, SPIKES = 64, 16  # This many go to its sharpest vertices, and to the triangles around the sharpest.
@@ -296,10 +297,10 @@ class _Run:
     def atlas(
         self, earlier: dict[int, tuple[int, Table]]
     ) -> Generator[float, None, tuple[Atlas, list[PointNormal]]]:
-        """The atlas of what was found so far, and contacts where something is missing.
+        """The atlas of what was found so far, and contacts where something is missing or less certain.
 
-        These are where the joined surface ends though the object goes on, and where a finger from outside
-        meets something else.
+        These are where the joined surface ends though the object goes on, where a finger from outside meets
+        something else, and where the surface is less certain than the tolerance.
         """
         charts = yield from part_of(self.joining(earlier), 0.0, JOINED)
         patches = tuple(e.result for e in self.found)
@@ -325,7 +326,7 @@ class _Run:
         atlas = yield from atlas.widened()
         contacts: list[PointNormal] = [contact for _, contact in uncovered]
         contacts += zip(check.points[off], check.normals[off], strict=True)
-        return atlas, contacts
+        return atlas, contacts + (self.uncertain_contacts(atlas.reference.mesh) if atlas.is_rough else [])
 
     def off(self, points: Array, normals: Array) -> Array:
         """How far the object is off places (n, 3) with normals (n, 3), (n,); inf beyond the tolerance.
@@ -338,6 +339,14 @@ class _Run:
             math.inf if contact is None else math.dist(place[0], contact[0])
             for place, contact in zip(places, contacts, strict=True)
         ])  # fmt: skip
+
+    def uncertain_contacts(self, mesh: Mesh) -> list[Contact]:
+        """Contacts where the surface is less certain than LIMIT tolerances, apart from each other."""
+        rough, normals = np.flatnonzero(mesh.std > LIMIT * self.tolerance), mesh.normals
+        rough = rough[np.argsort(-mesh.std[rough], kind="stable")]
+        apart = AGAIN_APART * self.frontier.charts.radii[mesh.patch[rough]]
+        places = rough[far_apart(mesh.vertices[rough], apart)]
+        return self.frontier.felt_near(mesh.vertices[places], normals[places])
 
 
 def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], float]:
@@ -375,7 +384,7 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
 
 
 def _joined_and_refined(run: _Run) -> Steps:
-    """The atlas of what was found, after more touches where something is missing."""
+    """The atlas of what was found, after more touches where something is missing or less certain."""
     earlier: dict[int, tuple[int, Table]] = {}
     for again in range(AGAIN, -1, -1):
         atlas, contacts = yield from run.showing(run.atlas(earlier))
