@@ -341,7 +341,10 @@ class _Run:
         ])  # fmt: skip
 
     def uncertain_contacts(self, mesh: Mesh) -> list[Contact]:
-        """Contacts where the surface is less certain than LIMIT tolerances, apart from each other."""
+        """Contacts where the surface is less certain than LIMIT tolerances, apart from each other.
+
+        Without touches there, the standard model fandisk ends in doubt.
+        """
         rough, normals = np.flatnonzero(mesh.std > LIMIT * self.tolerance), mesh.normals
         rough = rough[np.argsort(-mesh.std[rough], kind="stable")]
         apart = AGAIN_APART * self.frontier.charts.radii[mesh.patch[rough]]
