@@ -19,7 +19,7 @@ modifier, where patches of the same radius and of half of it agree. Those of 10,
 decimated (Decimate modifier, Collapse), and compared with the polynomials of benchmarks.curvatures that fit
 their own mesh there, the nearer one, so nearly all places count.
 One is off by 1/4 if it is by more than .1 / L as well, and wrong if also by more than two stated deviations.
-A doubt about facets is needed if it is off by more than .1 / L and two deviations of the contacts alone.
+A doubt about facets is needed if it is off by more than .1 / L and two deviations that the contacts have.
 """
 
 import math
@@ -280,8 +280,8 @@ def decimated(bpy, path):
         yield share, obj, dense
 
 
-def beside_dense(found, dense):
-    """Whether a touch is off its dense mesh, beyond two deviations as well, and within two of contacts alone.
+def compared_with_dense(found, dense):
+    """Whether a touch is off its dense mesh, beyond two deviations as well, and within two of the contacts.
 
     None if no polynomial explains the mesh there.
     """
@@ -293,8 +293,8 @@ def beside_dense(found, dense):
         ((np.abs(k - true).max(), max(WRONG * np.abs(true).max(), KNOWN / r.radius)) for true in fits),
         key=lambda pair: pair[0] / pair[1],
     )
-    alone = max(KNOWN / r.radius, WITHIN * r.posterior.curvature_std() / r.radius)
-    return off > allowed, off > max(allowed, WITHIN * deviation(r)), off <= alone
+    most = max(KNOWN / r.radius, WITHIN * r.posterior.curvature_std() / r.radius)
+    return off > allowed, off > max(allowed, WITHIN * deviation(r)), off <= most
 
 
 def print_decimated(bpy, paths, touch):
@@ -306,8 +306,8 @@ def print_decimated(bpy, paths, touch):
                     continue
                 is_sure, is_of_facets = verdict(found) == "ok", verdict(found) == "facets"
                 counts[share][:1] += 1
-                if (beside := beside_dense(found, dense)) is not None:
-                    is_off, is_wrong, is_right = beside
+                if (comparison := compared_with_dense(found, dense)) is not None:
+                    is_off, is_wrong, is_right = comparison
                     counts[share][1:] += [
                         *(is_sure, is_sure and is_off, is_sure and is_wrong),
                         *(is_of_facets, is_of_facets and is_right),
