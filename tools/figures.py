@@ -60,6 +60,7 @@ RUNS = {
     "real": Run("benchmarks.real", "Scans of real objects"),
     "curvatures": Run("benchmarks.curvatures", "How often deviations hold"),
     "facets": Run(f"benchmarks.facets {ZIP}", "Facets"),
+    "decimated": Run(f"benchmarks.facets {ZIP} --models $MODELS", "Facets of models, whole and decimated"),
     "stability": Run("benchmarks.stability", "Limits of the methods", _chart("stability")),
     "shapes": Run(
         "benchmarks.atlas --shapes --coarsest 0.002",
