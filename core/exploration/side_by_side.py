@@ -5,7 +5,7 @@
 import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -49,18 +49,17 @@ def exploring_many(
     def steps(point: Array, direction: Array) -> Steps:
         """The steps of one touch."""
         place = surface, vector_of(point), vector_of(direction)
-        touch = Touch(
-            surface,
-            partial(
-                tracker, *place, noise=options.noise, rng=generator, tangent=tangent, least_cosine=cosine
-            ),
-            point,
-            reference=SamplingPlane(0.0).axes(direction, tangent),
-            farthest=options.farthest
-            or _farthest(*place, options.planes, partial(track, *place, tangent=tangent)),
-            options=options,
+
+        @cache
+        def follow(planes: tuple[SamplingPlane, ...], step: float) -> Callable[[float], list[Contour]]:
+            """What follows the contours of planes."""
+            given = {"step": step, "noise": options.noise, "least_cosine": cosine}
+            return tracker(*place, planes, rng=generator, tangent=tangent, **given)
+
+        farthest = options.farthest or _farthest(
+            *place, options.planes, partial(track, *place, tangent=tangent)
         )
-        return (yield from touch.steps())
+        return (yield from Touch(surface, point, direction, follow, farthest, options).steps())
 
     return _side_by_side([steps(*place) for place in zip(p, up, strict=True)], p, up, options.fit)
 
@@ -154,8 +153,8 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
             yield
         answers = {}
         for method, options in methods.items():
-            which = [i for i, r in requests.items() if ("bayes" if r.searching else fit.method) == method]
-            touches = [TouchContacts(requests[i].contours, *no_strokes) for i in which]
+            which = [i for i, request in requests.items() if request[1] == method]
+            touches = [TouchContacts(requests[i][0], *no_strokes) for i in which]
             if which:
                 results = fitted(points[which], touches, outward[which], options)
                 answers.update(zip(which, results, strict=True))

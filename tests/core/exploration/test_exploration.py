@@ -297,6 +297,13 @@ def test_a_given_step_is_kept_where_the_extent_is_free():
     assert found.extent > 8.0
 
 
+@pytest.mark.parametrize("step", [0.3, 4.0])
+def test_lengths_that_are_tried_are_no_shorter_than_a_given_step(step):
+    found = explore(short_waves(), step=step)
+    assert found.step == step <= found.extent
+    assert found.result.status == "uncertain"
+
+
 def test_the_size_is_that_of_the_default_fit_whatever_the_method():
     surface = rib(at=9.0, high=0.8, wide=1.0)
     ends = [[c.points[[0, -1]] for c in explore(surface, method=m).contours] for m in ("bayes", "tagc")]
