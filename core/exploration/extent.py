@@ -22,7 +22,7 @@ from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.explained import are_few, too_far
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
-from ..reconstruction.status import DOUBTFUL_STD
+from ..reconstruction.status import DOUBTFUL_FIT, DOUBTFUL_STD
 from ..verdict import OK
 from .facets import with_facets
 from .options import ExplorationOptions
@@ -32,8 +32,6 @@ from .taps import tapped
 MOST_CONTACTS = 16  # The longest half curves that are tried have this number of contacts.
 RUNGS = 4  # After this number of lengths with one ratio, which halve them, the step is halved.
 HALVINGS = 8  # The step is halved this many times. With 6, 45 of 900 touches of scans more are in doubt.
-# Contacts up to this roughness are fitted: with 0.0085 there are a sixth fewer fits, for 3 % less area.
-ROUGH = 0.01
 # A sure patch is off its taps by at most this share of the radius in the mean, where a place without surface
 # is off by the radius: with 0.02 sure patches are 6 % farther off, with 0.01 they have a seventh less area.
 TAPS_OFF = 0.015
@@ -128,7 +126,7 @@ class Touch:
         tried: list[Exploration] = []
         rough: dict[tuple[float, int], float] = {}
         for rung in self._rungs():
-            if (roughness := self._roughness(next(self._denser(*rung))[0])) > ROUGH:
+            if (roughness := self._roughness(next(self._denser(*rung))[0])) > DOUBTFUL_FIT:
                 rough[rung] = roughness / math.prod(rung)
                 continue
             try:

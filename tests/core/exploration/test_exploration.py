@@ -132,7 +132,7 @@ def test_what_is_too_rough_for_any_fit_to_be_trusted_is_not_fitted(monkeypatch):
     fits = []
     monkeypatch.setattr(side_by_side, "fitted", lambda *given: fits.append(1) or fitted(*given))
     found, few = explore(short_waves()), len(fits)
-    monkeypatch.setattr(extent, "ROUGH", np.inf)
+    monkeypatch.setattr(extent, "DOUBTFUL_FIT", np.inf)
     assert explore(short_waves()).extent == found.extent
     assert len(fits) - few > few
 
