@@ -53,8 +53,15 @@ def exploring_many(
         @cache
         def follow(planes: tuple[SamplingPlane, ...], step: float) -> Callable[[float], list[Contour]]:
             """What follows the contours of planes."""
-            given = {"step": step, "noise": options.noise, "least_cosine": cosine}
-            return tracker(*place, planes, rng=generator, tangent=tangent, **given)
+            return tracker(
+                *place,
+                planes,
+                step=step,
+                noise=options.noise,
+                rng=generator,
+                tangent=tangent,
+                least_cosine=cosine,
+            )
 
         farthest = options.farthest or _farthest(
             *place, options.planes, partial(track, *place, tangent=tangent)
