@@ -66,6 +66,7 @@ class Exploration:
 
 Request = tuple[list[Contour], str]  # Contours to be fitted, and the method.
 Answer = Reconstruction | DegenerateCurvesError
+Follow = Callable[[float], list[Contour]]
 Steps = Generator[Request, Answer, Exploration]
 
 
@@ -76,13 +77,15 @@ class Touch:
     surface : the finger taps it between the curves
     point, outward : (3,)
     follow : takes planes and a step, returns what follows their contours to a given extent
+    followed : by step, what follows the contours of the options' planes, and goes on where it was
     farthest : a length that no half curve exceeds
     """
 
     surface: Surface
     point: Array
     outward: Array
-    follow: Callable[[tuple[SamplingPlane, ...], float], Callable[[float], list[Contour]]]
+    follow: Callable[[Sequence[SamplingPlane], float], Follow]
+    followed: Callable[[float], Follow]
     farthest: float
     options: ExplorationOptions
 
@@ -178,7 +181,7 @@ class Touch:
             step = self.options.step or extent / MOST_CONTACTS
             if extent < step:
                 break
-            felt = _most_in_half(self._cut(self.options.planes, step, extent), self.point)
+            felt = _most_in_half(self._cut(step, extent), self.point)
             shares = 2.0 ** (-np.arange(RUNGS + 1) / RUNGS)
             counts = (shares * extent / step + 1e-6).astype(int).tolist()
             yield from ((step, count) for count, shorter in pairwise(counts) if min(felt, count) > shorter)
@@ -203,7 +206,7 @@ class Touch:
         given = self.options.step
         steps = [step / times for times in DENSER] if given is None else [given]
         for between in steps:
-            contours = self._cut(self.options.planes, between, self.options.extent or step * count)
+            contours = self._cut(between, self.options.extent or step * count)
             if between == steps[-1] or not stops_at(contours, self.point):
                 yield contours, between
 
@@ -216,14 +219,15 @@ class Touch:
         judged = r.judged_with(taps=tapped(self.surface, r))
         return replace(explored, result=with_facets(judged, self.surface))
 
-    def _cut(self, planes: Sequence[SamplingPlane], step: float, extent: float) -> list[Contour]:
-        """Contours of planes to an extent."""
-        contours = self.follow(tuple(planes), step)(extent)
+    def _cut(self, step: float, extent: float, follow: Follow | None = None) -> list[Contour]:
+        """Contours of the options' planes to an extent, or those that are followed instead."""
+        contours = (follow or self.followed(step))(extent)
         return contours if extent + step > self.farthest else list(map(_ended, contours))
 
     def _with_plane(self, explored: Exploration, plane: SamplingPlane) -> Steps:
         """The touch with one plane more. Raises ValueError if nothing can be felt along it."""
-        contours = [*explored.contours, *self._cut([plane], explored.step, explored.extent)]
+        step, extent = explored.step, explored.extent
+        contours = [*explored.contours, *self._cut(step, extent, self.follow([plane], step))]
         r = yield from _fitted(contours, self.options.method)
         planes = (*explored.planes, plane)
         return self._with_taps(replace(explored, contours=contours, result=r, planes=planes))

@@ -18,7 +18,7 @@ from ..reconstruction.from_contours import fitted
 from ..reconstruction.options import FitOptions
 from ..reconstruction.start import TouchContacts
 from ..reconstruction.strokes import gathered
-from .extent import MOST_CONTACTS, Answer, Exploration, Request, Steps, Touch
+from .extent import MOST_CONTACTS, Answer, Exploration, Follow, Request, Steps, Touch
 from .options import ExplorationOptions
 from .taps import HAIR
 
@@ -50,8 +50,7 @@ def exploring_many(
         """The steps of one touch."""
         place = surface, vector_of(point), vector_of(direction)
 
-        @cache
-        def follow(planes: tuple[SamplingPlane, ...], step: float) -> Callable[[float], list[Contour]]:
+        def follow(planes: Sequence[SamplingPlane], step: float) -> Follow:
             """What follows the contours of planes."""
             return tracker(
                 *place,
@@ -66,7 +65,8 @@ def exploring_many(
         farthest = options.farthest or _farthest(
             *place, options.planes, partial(track, *place, tangent=tangent)
         )
-        return (yield from Touch(surface, point, direction, follow, farthest, options).steps())
+        followed = cache(partial(follow, options.planes))
+        return (yield from Touch(surface, point, direction, follow, followed, farthest, options).steps())
 
     return _side_by_side([steps(*place) for place in zip(p, up, strict=True)], p, up, options.fit)
 

@@ -606,6 +606,11 @@ def test_planes_may_be_a_number_of_evenly_laid_out_ones(count):
     assert counted.result.patch.k1 == given.result.patch.k1
 
 
+def test_an_azimuth_may_be_an_array_without_dimensions():
+    planes = [core.SamplingPlane(np.array(plane.azimuth)) for plane in PLANES]
+    assert explore(surfaces.plane(), planes=planes).result.status == "ok"
+
+
 @pytest.mark.parametrize("planes", [2, 25, 0, []])
 def test_too_few_or_too_many_planes_are_refused(planes):
     with pytest.raises(ValueError, match="planes: expected 3 to 24, or sampling planes, got"):
