@@ -16,7 +16,6 @@ from ..verdict import FROM_EDGE, LONGER, NOTICED, SHORTER, SIGNIFICANT, SUBDIVID
 
 # A fit is in doubt beyond these. benchmarks.stability chose them, benchmarks.real LIKELY and those of taps.
 DOUBTFUL_STD = 0.02  # Mean deviation of the height over the domain, as a share of the radius.
-DOUBTFUL_WAVES = 0.012  # What a quartic leaves of a rough surface along its curves, as a share of the radius.
 DOUBTFUL_CONDITION = 1e3  # The factor by which plain least squares amplifies noise.
 DOUBTFUL_TURN = math.radians(10.0)  # Angle by which the frame may be off.
 LIKELY = 0.5  # Probability of that angle on a rough surface, whose directions differ at each scale.
@@ -30,8 +29,9 @@ LEAST_SCATTER = 0.3
 # Angle in radians by which normals are off the curves, if it is above NOTICED of their deviations as well.
 SCATTERED = 0.15
 CONTRADICTING_CURVE = 7.0  # Deviations by which half of a curve is off what the others show.
-# Share of the radius by which half of the contacts are off, beyond their noise. Contacts that are rougher are
-# not fitted while an extent is chosen: with 0.0085 there are a sixth fewer fits, for 3 % less area.
+# Share of the radius by which half of the contacts are off, beyond their noise, and that a quartic leaves of
+# a rough surface along its curves. Contacts that are rougher are not fitted while an extent is chosen: with
+# 0.0085 there are a sixth fewer fits, for 3 % less area.
 DOUBTFUL_FIT = 0.01
 CONTRADICTING = 2.0  # Mean number of deviations by which the surface is off the patch between the curves.
 # A point is on a flat face if more than this share of the contacts, those next to it, have its normal to half
