@@ -116,7 +116,7 @@ PROMISES = [
     ("scripting", "| `version` | #; other versions", serialization.VERSION),
     ("scripting", "as long as one helps, up to six", of("tactile_addon/touch/settings", "MOST_PLANES") / 6),
     ("scripting", "A block that fails twice", of("cluster/worker/task", "TRIES") / 2),
-    ("stability", "more than # % of the radius.", 100 * status.DOUBTFUL_WAVES),
+    ("stability", "more than # % of the radius.", 100 * status.DOUBTFUL_FIT),
     ("stability", "from # % of the radius on it warns", 100 * status.DOUBTFUL_STD),
     ("stability", "be up to $#a/L$ off", bends.FOLD_BEND),
     ("stability", "is more than three times the stated one", of("benchmarks/stability", "TOO_FAR") / 3),

@@ -11,10 +11,10 @@ import numpy as np
 from ..arguments import Array
 from ..lapack import solved_square
 from ..patch.monge import TERMS, monomials
+from .evidence import ROUNDING
 from .posterior import QUARTIC_SHARE, SurfacePosterior, bent, normal_curvature_variances, terms_to
 from .prior import FREE
 
-INVISIBLE = 1e-12  # Directions with a smaller share of the sum of squares are invisible.
 CONTACTS_PER_RANK = 1.5  # The least number of contacts, as a multiple of the rank, that shows residuals.
 
 
@@ -31,7 +31,7 @@ def curvature_contradiction(contacts: Array, posterior: SurfacePosterior, covari
         return 0.0
     basis = monomials(near, TERMS)[:, : terms_to(4)]
     gram = basis.T @ basis
-    inverse = solved_square(gram + INVISIBLE * gram.trace() * np.eye(len(gram)), np.eye(len(gram)))
+    inverse = solved_square(gram + ROUNDING * gram.trace() * np.eye(len(gram)), np.eye(len(gram)))
     rank = float((inverse * gram).sum())
     if len(near) < CONTACTS_PER_RANK * rank:
         return 0.0

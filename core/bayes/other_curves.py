@@ -10,14 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..verdict import NOTICED
 from .joint_fit import posteriors_of
 from .posterior import SurfacePosterior
 
 LEAST_CURVES = 4  # Fewer curves, where all strokes count as one, never contradict each other.
 OUTER = 0.5  # A curve counts from this share of its reach on, where it leaves the tangent plane.
-# Waviness and noise of the others are estimated if a curve is off by more deviations without that. With
-# SIGNIFICANT in its place, 4 of 24 curves that are turned or shifted are missed.
-NOTICED = 4.0
 
 
 def contradicting_curve(
@@ -30,7 +28,8 @@ def contradicting_curve(
     posterior : of all contacts; noise : least deviation of a contact; point_std : as in `Observations`
 
     Both are medians over the outer contacts of the curve that is off by most deviations, so outliers do not
-    count. There are LEAST_CURVES or more.
+    count. There are LEAST_CURVES or more. Waviness and noise of the others are estimated if a curve is off by
+    more than NOTICED deviations without that.
     """
     numbers = np.unique(curve)
     others = (curve != numbers[numbers >= 0][:, None]).astype(float)

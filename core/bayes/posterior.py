@@ -31,7 +31,6 @@ from ..patch.monge import (
     monomials,
     polynomial_derivatives,
 )
-from . import kernel as process
 from .kernel import derived_kernel, kernel, kernels, places_factor, weighted_kernel
 from .prior import FREE, ORDERS
 
@@ -209,7 +208,7 @@ class SurfacePosterior(HeightField):
             return root.T @ root
         ones = _projection()[1].sum(axis=1)
         known, left = self._whitened_sums(_projected_terms().T, ones, self._projected_within)
-        own = sum(map(np.multiply, self.variances, _projected_kernels(tuple(process.LENGTHS))))
+        own = sum(map(np.multiply, self.variances, _projected_kernels()))
         return own + left.T @ left - known.T @ known
 
     def patch(self, degree: int) -> MongePatch:
@@ -402,8 +401,7 @@ def _projected_terms() -> Array:
 
 
 @cache
-def _projected_kernels(lengths: tuple[float, ...]) -> Array:
-    """Covariances (2, 27, 27) of the coefficients of a process of unit variance and each of the lengths."""
-    assert lengths == tuple(process.LENGTHS)
+def _projected_kernels() -> Array:
+    """Covariances (2, 27, 27) of the coefficients of a process of unit variance and each of LENGTHS."""
     at, weights = _projection()
     return np.array([weights @ values @ weights.T for values in kernels(at, at)])

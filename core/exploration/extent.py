@@ -7,10 +7,9 @@ So touches of one surface can go side by side, and their fits be done in stacks.
 """
 
 import math
-from collections.abc import Callable, Generator, Iterable, Iterator
-from dataclasses import dataclass, field, replace
-from itertools import chain, pairwise
-from typing import NamedTuple
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.explained import are_few, too_far
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
-from ..reconstruction.status import DOUBTFUL_STD
+from ..reconstruction.status import DOUBTFUL_FIT, DOUBTFUL_STD
 from ..verdict import OK
 from .facets import with_facets
 from .options import ExplorationOptions
@@ -33,8 +32,6 @@ from .taps import tapped
 MOST_CONTACTS = 16  # The longest half curves that are tried have this number of contacts.
 RUNGS = 4  # After this number of lengths with one ratio, which halve them, the step is halved.
 HALVINGS = 8  # The step is halved this many times. With 6, 45 of 900 touches of scans more are in doubt.
-# Contacts up to this roughness are fitted: with 0.0085 there are a sixth fewer fits, for 3 % less area.
-ROUGH = 0.01
 # A sure patch is off its taps by at most this share of the radius in the mean, where a place without surface
 # is off by the radius: with 0.02 sure patches are 6 % farther off, with 0.01 they have a seventh less area.
 TAPS_OFF = 0.015
@@ -42,15 +39,6 @@ TAPS_OFF = 0.015
 # (benchmarks.amount of e20b52a).
 CONTACTS, DENSER = 12, (1, 2, 4)
 HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed, e20b52a).
-
-Answer = Reconstruction | DegenerateCurvesError
-
-
-class Request(NamedTuple):
-    """Contours to be fitted: with the caller's options or, while `searching` an extent, by "bayes"."""
-
-    contours: list[Contour]
-    searching: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,52 +61,53 @@ class Exploration:
     @property
     def reach(self) -> float:
         """The length of the longest half curve; the surface may end all before the extent."""
-        return self.step * max(max(_side_counts(contour, self.result.point)) for contour in self.contours)
+        return self.step * _most_in_half(self.contours, self.result.point)
 
 
-Steps = Generator[Request, Answer, Exploration]
+Request = tuple[list[Contour], str]  # Contours to be fitted, and the method.
+Answer = Reconstruction | DegenerateCurvesError
 Follow = Callable[[float], list[Contour]]
+Steps = Generator[Request, Answer, Exploration]
 
 
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """One touch, and what the finger has felt there.
+    """One touch: where it is, and what the finger follows there.
 
     surface : the finger taps it between the curves
+    point, outward : (3,)
     follow : takes planes and a step, returns what follows their contours to a given extent
-    point : (3,)
-    reference : columns e1, n and e1 x n, from which azimuths are measured
+    followed : by step, what follows the contours of the options' planes, and goes on where it was
     farthest : a length that no half curve exceeds
-    followed : by step, what follows the contours of the options' planes to a given extent
-    tapped : contacts of taps, (n, 3) each
     """
 
     surface: Surface
-    follow: Callable[..., Follow]
     point: Array
-    reference: Array
+    outward: Array
+    follow: Callable[[Sequence[SamplingPlane], float], Follow]
+    followed: Callable[[float], Follow]
     farthest: float
     options: ExplorationOptions
-    followed: dict[float, Follow] = field(default_factory=dict)
-    tapped: list[Array] = field(default_factory=lambda: [np.empty((0, 3))])
 
     def steps(self) -> Steps:
         """The touch, with planes added while they help. They make a patch more certain, not larger."""
-        extent, tolerance, method = self.options.extent, self.options.tolerance, self.options.method
-        if extent is None:
+        options, method = self.options, self.options.method
+        if options.extent is None:
             explored = yield from self._longest_sure()
             if method != "bayes":
-                r = yield from _fitted(explored.contours)
+                r = yield from _fitted(explored.contours, method)
                 shape = explored.result.shape_curvatures
                 explored = replace(explored, result=r.judged_with(shape_curvatures=shape))
         else:
-            explored = yield from self._felt(extent, self._denser(extent / CONTACTS, CONTACTS))
+            explored = yield from self._felt(options.extent / CONTACTS, CONTACTS, method)
         explored = self._with_taps(explored)
         stds = [explored.result.mean_height_std]
         while (
-            tolerance is not None and stds[-1] > tolerance and len(explored.planes) < self.options.most_planes
+            options.tolerance is not None
+            and stds[-1] > options.tolerance
+            and len(explored.planes) < options.most_planes
         ):
-            plane, expected = suggest_plane(explored.result, self.reference[:, 1], self.reference[:, 0])
+            plane, expected = suggest_plane(explored.result, self.outward, options.tangent)
             if expected > (1.0 - HELPS) * stds[-1]:
                 break
             try:
@@ -140,13 +129,11 @@ class Touch:
         tried: list[Exploration] = []
         rough: dict[tuple[float, int], float] = {}
         for rung in self._rungs():
-            denser, extent = self._denser(*rung), math.prod(rung)
-            first = next(denser)
-            if (roughness := self._roughness(first[0])) > ROUGH:
-                rough[rung] = roughness / extent
+            if (roughness := self._roughness(next(self._denser(*rung))[0])) > DOUBTFUL_FIT:
+                rough[rung] = roughness / math.prod(rung)
                 continue
             try:
-                explored = yield from self._felt(extent, chain([first], denser))
+                explored = yield from self._felt(*rung)
             except DegenerateCurvesError:
                 continue
             if _is_sure(explored.result, self.options) and _explains(explored, self.options):
@@ -158,9 +145,8 @@ class Touch:
                 break
         if rough or not tried:
             longest = self.farthest / MOST_CONTACTS, MOST_CONTACTS
-            rung = min(rough, key=rough.__getitem__, default=longest)
             try:
-                tried.append((yield from self._felt(math.prod(rung), self._denser(*rung))))
+                tried.append((yield from self._felt(*min(rough, key=rough.__getitem__, default=longest))))
             except DegenerateCurvesError:
                 if not tried:
                     raise
@@ -191,34 +177,37 @@ class Touch:
         Lengths at which the surface has ended every half curve already would repeat it, and are left out.
         """
         for halvings in range(HALVINGS + 1):
-            finest = self.farthest / MOST_CONTACTS / 2.0**halvings
-            step = self.options.step or finest
-            contours = self._followed(step, MOST_CONTACTS * finest)
-            longest = max(max(_side_counts(contour, self.point)) for contour in contours)
+            extent = self.farthest / 2.0**halvings
+            step = self.options.step or extent / MOST_CONTACTS
+            if extent < step:
+                break
+            felt = _most_in_half(self._cut(step, extent), self.point)
             shares = 2.0 ** (-np.arange(RUNGS + 1) / RUNGS)
-            counts = (MOST_CONTACTS * shares * finest / step + 1e-6).astype(int).tolist()
-            yield from ((step, count) for count, shorter in pairwise(counts) if min(longest, count) > shorter)
+            counts = (shares * extent / step + 1e-6).astype(int).tolist()
+            yield from ((step, count) for count, shorter in pairwise(counts) if min(felt, count) > shorter)
 
-    def _felt(self, extent: float, denser: Iterable[tuple[list[Contour], float]]) -> Steps:
+    def _felt(self, step: float, count: int, method: str = "bayes") -> Steps:
         """The touch with half curves of this length, and the first number of contacts that suffices."""
-        for contours, between in denser:  # noqa: B007
-            r = yield Request(contours, self.options.extent is None)
+        for contours, between in self._denser(step, count):  # noqa: B007
+            r = yield contours, method
             if isinstance(r, Reconstruction) and suffices(r):
                 break
         if isinstance(r, DegenerateCurvesError):
             raise r
-        return Exploration(contours, r, extent, between, tuple(self.options.planes))
+        return Exploration(
+            contours, r, self.options.extent or step * count, between, tuple(self.options.planes)
+        )
 
     def _denser(self, step: float, count: int) -> Iterator[tuple[list[Contour], float]]:
         """Contours of half curves of `count` contacts, and then of more in the same length; and their steps.
 
-        An automatic extent begins with the longest step that has contacts on all sides of the point.
+        They begin with the longest step that has contacts on all sides of the point.
         """
         given = self.options.step
         steps = [step / times for times in DENSER] if given is None else [given]
         for between in steps:
-            contours = self._cut(between, int(step * count / between * (1.0 + 1e-6)))
-            if between == steps[-1] or self.options.extent or not stops_at(contours, self.point):
+            contours = self._cut(between, self.options.extent or step * count)
+            if between == steps[-1] or not stops_at(contours, self.point):
                 yield contours, between
 
     def _with_taps(self, explored: Exploration) -> Exploration:
@@ -227,35 +216,26 @@ class Touch:
         # A largest deviation judges the fit in place of shares of the radius.
         if r.taps is not None or self.options.largest_std is not None:
             return explored
-        taps, contacts = tapped(self.surface, r, np.concatenate(self.tapped))
-        self.tapped.append(contacts)
-        return replace(explored, result=with_facets(r.judged_with(taps=taps), self.surface))
+        judged = r.judged_with(taps=tapped(self.surface, r))
+        return replace(explored, result=with_facets(judged, self.surface))
 
-    def _followed(self, step: float, extent: float) -> list[Contour]:
-        """The contours of the planes with contacts this step apart, to an extent."""
-        if step not in self.followed:
-            self.followed[step] = self.follow(self.options.planes, step=step)
-        return self.followed[step](extent)
-
-    def _cut(self, step: float, count: int) -> list[Contour]:
-        """The contours of the planes with half curves of `count` contacts this step apart."""
-        contours = self._followed(step, step * count)
-        is_farthest = count >= int(self.farthest / step * (1.0 + 1e-6))
-        return contours if is_farthest else list(map(_ended, contours))
+    def _cut(self, step: float, extent: float, follow: Follow | None = None) -> list[Contour]:
+        """Contours of the options' planes to an extent, or those that are followed instead."""
+        contours = (follow or self.followed(step))(extent)
+        return contours if extent + step > self.farthest else list(map(_ended, contours))
 
     def _with_plane(self, explored: Exploration, plane: SamplingPlane) -> Steps:
         """The touch with one plane more. Raises ValueError if nothing can be felt along it."""
-        (more,) = self.follow((plane,), step=explored.step)(explored.extent)
-        if explored.extent < self.farthest:
-            more = _ended(more)
-        contours, planes = [*explored.contours, more], (*explored.planes, plane)
-        r = yield from _fitted(contours)
+        step, extent = explored.step, explored.extent
+        contours = [*explored.contours, *self._cut(step, extent, self.follow([plane], step))]
+        r = yield from _fitted(contours, self.options.method)
+        planes = (*explored.planes, plane)
         return self._with_taps(replace(explored, contours=contours, result=r, planes=planes))
 
 
-def _fitted(contours: list[Contour]) -> Generator[Request, Answer, Reconstruction]:
+def _fitted(contours: list[Contour], method: str) -> Generator[Request, Answer, Reconstruction]:
     """The reconstruction of contours. Raises DegenerateCurvesError if they carry none."""
-    r = yield Request(contours)
+    r = yield contours, method
     if isinstance(r, DegenerateCurvesError):
         raise r
     return r
@@ -296,10 +276,10 @@ def _explains(explored: Exploration, options: ExplorationOptions) -> bool:
     return are_few(far, np.append(far[1:], False))
 
 
-def _side_counts(contour: Contour, point: Array) -> tuple[int, int]:
-    """The numbers of contacts on either side of a point, which is one of them."""
-    at = contour.points.tolist().index(point.tolist())
-    return at, len(contour.points) - 1 - at
+def _most_in_half(contours: Sequence[Contour], point: Array) -> int:
+    """The number of contacts of the longest half curve; the point is one contact of each contour."""
+    at = [(contour.points.tolist().index(point.tolist()), len(contour.points)) for contour in contours]
+    return max(max(before, number - 1 - before) for before, number in at)
 
 
 def _ended(contour: Contour) -> Contour:

@@ -5,7 +5,7 @@
 import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +18,7 @@ from ..reconstruction.from_contours import fitted
 from ..reconstruction.options import FitOptions
 from ..reconstruction.start import TouchContacts
 from ..reconstruction.strokes import gathered
-from .extent import MOST_CONTACTS, Answer, Exploration, Request, Steps, Touch
+from .extent import MOST_CONTACTS, Answer, Exploration, Follow, Request, Steps, Touch
 from .options import ExplorationOptions
 from .taps import HAIR
 
@@ -49,18 +49,24 @@ def exploring_many(
     def steps(point: Array, direction: Array) -> Steps:
         """The steps of one touch."""
         place = surface, vector_of(point), vector_of(direction)
-        touch = Touch(
-            surface,
-            partial(
-                tracker, *place, noise=options.noise, rng=generator, tangent=tangent, least_cosine=cosine
-            ),
-            point,
-            reference=SamplingPlane(0.0).axes(direction, tangent),
-            farthest=options.farthest
-            or _farthest(*place, options.planes, partial(track, *place, tangent=tangent)),
-            options=options,
+
+        def follow(planes: Sequence[SamplingPlane], step: float) -> Follow:
+            """What follows the contours of planes."""
+            return tracker(
+                *place,
+                planes,
+                step=step,
+                noise=options.noise,
+                rng=generator,
+                tangent=tangent,
+                least_cosine=cosine,
+            )
+
+        farthest = options.farthest or _farthest(
+            *place, options.planes, partial(track, *place, tangent=tangent)
         )
-        return (yield from touch.steps())
+        followed = cache(partial(follow, options.planes))
+        return (yield from Touch(surface, point, direction, follow, followed, farthest, options).steps())
 
     return _side_by_side([steps(*place) for place in zip(p, up, strict=True)], p, up, options.fit)
 
@@ -154,8 +160,8 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
             yield
         answers = {}
         for method, options in methods.items():
-            which = [i for i, r in requests.items() if ("bayes" if r.searching else fit.method) == method]
-            touches = [TouchContacts(requests[i].contours, *no_strokes) for i in which]
+            which = [i for i, request in requests.items() if request[1] == method]
+            touches = [TouchContacts(requests[i][0], *no_strokes) for i in which]
             if which:
                 results = fitted(points[which], touches, outward[which], options)
                 answers.update(zip(which, results, strict=True))

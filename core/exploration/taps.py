@@ -44,27 +44,19 @@ def places(domain: Domain) -> Array:
     return np.concatenate([nodes, NEAR_RIM / domain.node_places[-1] * outermost])
 
 
-def tapped(surface: Surface, r: Reconstruction, felt: Array) -> tuple[Taps, Array]:
-    """Taps along the fit's normal between the curves.
-
-    felt : (n, 3), contacts of taps of longer curves, which contradict this fit, too, if they are off it
-
-    Also returns the contacts of these taps, (m, 3). They have no noise: it would not change the verdict.
-    """
+def tapped(surface: Surface, r: Reconstruction) -> Taps:
+    """Taps along the fit's normal between the curves. They have no noise: it would not change the verdict."""
     feet, weighted = _on_patch(r, places(r.domain)), len(r.domain.nodes[1])
     heights = heights_at(r, surface, feet)
     met = ~np.isnan(heights)
-    contacts = r.frame.to_world(feet[met] + np.outer(heights[met], [0.0, 0.0, 1.0]))
-    local = r.frame.to_local(np.concatenate([contacts, felt]))
-    x, y, z = local[r.domain.contains(*local[:, :2].T)].T
-    off = np.abs(z - r.height(x, y))
+    off = np.abs(heights[met])
     noise = max((contour.noise or 0.0 for contour in r.contours), default=0.0)
     error = mean_error(r, heights[:weighted])
-    contradicts = (off > TOO_FAR_OFF * np.hypot(r.height_std(x, y), noise)).any() or (
+    contradicts = (off > TOO_FAR_OFF * np.hypot(r.height_std(*feet[met, :2].T), noise)).any() or (
         (error.height or 0.0) > CONTRADICTING * r.mean_height_std
     )
     most = float(off.max(initial=0.0)) / r.radius if contradicts else 0.0
-    return Taps(len(heights), int((~met).sum()), most, error.missing, error.height), contacts
+    return Taps(len(heights), int((~met).sum()), most, error.missing, error.height)
 
 
 def mesh_error(r: Reconstruction, surface: Surface) -> MeshError:

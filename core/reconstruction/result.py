@@ -399,7 +399,7 @@ class Reconstruction(Judged):
         if deviations > status.CONTRADICTING_CURVE:
             yield Doubt("curve", off, status.CONTRADICTING_CURVE * off / deviations)
         if not len(self.strokes):
-            yield from beyond("waves", self.waves / self.radius, status.DOUBTFUL_WAVES, useless)
+            yield from beyond("waves", self.waves / self.radius, status.DOUBTFUL_FIT, useless)
         bent, std = self.radius * max(abs(self.k1), abs(self.k2)), self.posterior.curvature_std()
         if status.is_on_flat_face(bent, std, self.contours, self.frame.origin):
             yield Doubt("flat_face", bent, std, useless=useless)

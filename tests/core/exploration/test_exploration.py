@@ -132,7 +132,7 @@ def test_what_is_too_rough_for_any_fit_to_be_trusted_is_not_fitted(monkeypatch):
     fits = []
     monkeypatch.setattr(side_by_side, "fitted", lambda *given: fits.append(1) or fitted(*given))
     found, few = explore(short_waves()), len(fits)
-    monkeypatch.setattr(extent, "ROUGH", np.inf)
+    monkeypatch.setattr(extent, "DOUBTFUL_FIT", np.inf)
     assert explore(short_waves()).extent == found.extent
     assert len(fits) - few > few
 
@@ -295,6 +295,13 @@ def test_a_given_step_is_kept_where_the_extent_is_free():
     gaps = np.concatenate([np.linalg.norm(np.diff(c.points, axis=0), axis=1) for c in found.contours])
     assert gaps == pytest.approx(1.5, rel=2e-3)
     assert found.extent > 8.0
+
+
+@pytest.mark.parametrize("step", [0.3, 4.0])
+def test_lengths_that_are_tried_are_no_shorter_than_a_given_step(step):
+    found = explore(short_waves(), step=step)
+    assert found.step == step <= found.extent
+    assert found.result.status == "uncertain"
 
 
 def test_the_size_is_that_of_the_default_fit_whatever_the_method():
@@ -597,6 +604,11 @@ def test_planes_may_be_a_number_of_evenly_laid_out_ones(count):
     counted, given = (explore(ball, ball.point, ball.normal, planes=p) for p in (count, planes))
     assert counted.planes == tuple(planes)
     assert counted.result.patch.k1 == given.result.patch.k1
+
+
+def test_an_azimuth_may_be_an_array_without_dimensions():
+    planes = [core.SamplingPlane(np.array(plane.azimuth)) for plane in PLANES]
+    assert explore(surfaces.plane(), planes=planes).result.status == "ok"
 
 
 @pytest.mark.parametrize("planes", [2, 25, 0, []])
