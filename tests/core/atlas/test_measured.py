@@ -675,6 +675,14 @@ def noisy_ball():
     return [ring + rng.normal(0.0, 1e-3, ring.shape) for ring in rings_of_ball(gap=0.1)]
 
 
+def test_the_smallest_patch_reaches_the_next_line_of_contacts_where_these_are_dense():
+    turn = np.linspace(0.0, 2.0 * np.pi, 500, endpoint=False)
+    circle = np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+    rings = [np.sqrt(1.0 - z**2) * circle + (0.0, 0.0, z) for z in np.linspace(-0.95, 0.95, 12)]
+    atlas = core.atlas_of(rings, noise=1e-3)  # FEWEST contacts of one ring carry no patch.
+    assert np.abs(np.linalg.norm(atlas.reference.mesh.vertices, axis=1) - 1.0).max() < 0.01
+
+
 @pytest.mark.long
 def test_deviations_are_those_of_the_mean_of_overlapping_patches():
     atlas = core.atlas_of(noisy_ball(), noise=1e-3)
