@@ -676,7 +676,7 @@ def noisy_ball():
 
 
 def test_the_smallest_patch_reaches_the_next_line_of_contacts_where_these_are_dense():
-    turn = np.linspace(0.0, 2.0 * np.pi, 500, endpoint=False)
+    turn = np.linspace(0.0, 2.0 * np.pi, 800, endpoint=False)
     circle = np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
     rings = [np.sqrt(1.0 - z**2) * circle + (0.0, 0.0, z) for z in np.linspace(-0.95, 0.95, 12)]
     atlas = core.atlas_of(rings, noise=1e-3)  # FEWEST contacts of one ring carry no patch.
