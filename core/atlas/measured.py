@@ -20,7 +20,7 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.start import TOUCH_ROUNDING, too_coarse
 from ..steps import chunked, part_of, result_of
 from ..triangles import row_dot
-from ..verdict import SIGNIFICANT, Doubt, beyond
+from ..verdict import Doubt, beyond
 from .charts import AZIMUTHS, Charts
 from .connectivity import Indices, graph_of, pieces_of
 from .field import AGREE, INSIDE, sheet_facing
@@ -431,15 +431,14 @@ class _Cloud(NamedTuple):
     def explains(self, r: Reconstruction, some: Indices) -> bool:
         """Whether a patch explains some of the contacts, to which it was fitted, within their noise.
 
-        What noise hides at each contact, such as a low step, shows where neighbors are off to the same side:
-        products of their distances (Moran, Notes on continuous stochastic phenomena, 1950) are 0 on average
-        if only noise makes these.
+        What noise hides at each contact, such as a low step, the sum over its neighbors shows. This may be off
+        by twice as many of its deviations, for a patch has its own. Contacts that are too far do not hide it.
         """
         links, off = self.graph[some][:, some], self.distances(r, some)
         far = too_far(off, self.noise)
-        if far.any():  # These pull the patch, and others around them are off, too.
-            return are_few(far, links @ far)
-        return bool(off @ (links @ off) <= SIGNIFICANT * self.noise**2 * np.sqrt(2.0 * links.nnz))
+        near = np.where(far, 0.0, off)
+        sums, counts = near + links @ near, 1 + links.sum(axis=1)
+        return are_few(far, links @ far) and not too_far(sums, 2.0 * self.noise * np.sqrt(counts)).any()
 
     def distances(self, r: Reconstruction, some: Indices) -> Array:
         """Distances (n,) of some of the contacts from a patch, measured from its tangent planes."""
