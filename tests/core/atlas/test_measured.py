@@ -200,18 +200,18 @@ def test_no_patch_spans_a_notch_whose_walls_were_felt():
         assert distance == pytest.approx(np.full(40, out), abs=2e-3)
 
 
-def test_a_patch_does_not_explain_a_low_step_or_a_dent_that_the_noise_hides_at_each_contact():
+def test_a_patch_does_not_explain_what_the_noise_hides_from_single_contacts_but_not_from_their_mean():
     contacts = angle_atlas().contacts
     tree = cKDTree(contacts.points)
     cloud = measured._Cloud(contacts, tree, graph_of(contacts.links), 5e-4, None)
     _, i = tree.query((0.2, 0.7, 0.4))
     (r,), some = cloud.patches([i], 0.3), cloud.same_sheet(i, 0.3)
-    half = some[(contacts.points[some] - contacts.points[i]) @ r.frame.axes[:, 0] > 0.0]
     near, up = np.unique(contacts.links[i]), contacts.normals[i]
+    another = some[np.argmax(np.linalg.norm(contacts.points[some] - contacts.points[i], axis=1))]
     for which, height, is_explained in (
-        (half, 0.3, True),
-        (half, 1.0, False),
-        (np.unique(contacts.links[near]), 2.0, False),
+        (near, 0.0, True),
+        (near, 2.0, False),
+        (np.append(near, another), np.append(np.full(len(near), 2.0), 100.0)[:, None], False),
         (near[:1], 100.0, True),
         (near[:2], 100.0, False),
     ):
@@ -283,7 +283,7 @@ def random_on_cone(count, seed=0):
 
 
 def test_a_tip_that_is_cut_off_is_a_doubt_though_no_plane_is_far_from_the_surface():
-    for seed, status in ((6, "uncertain"), (7, "ok")):
+    for seed, status in ((4, "uncertain"), (7, "ok")):
         atlas = core.atlas_of([random_on_cone(1200, seed)])
         off = abs(atlas.distance([(0.0, 0.0, 1.0)])[0][0])
         assert (off > measured.MOST_OFF) == (status == "uncertain")
@@ -694,7 +694,7 @@ def test_deviations_are_those_of_the_mean_of_overlapping_patches():
 
 
 def test_above_a_cap_the_deviation_is_of_what_may_rise_beyond_its_rim():
-    out, heights = np.array([0.3, 0.35, 0.45]), np.array([0.5, 0.6, 0.7])
+    out, heights = np.array([0.3, 0.35, 0.45]), np.array([0.5, 0.65, 0.7])
     feet = np.column_stack([out, np.zeros(3), np.sqrt(1.0 - out**2)])
     distance, std = cap_atlas().distance((1.0 + heights)[:, None] * feet)
     assert distance == pytest.approx(heights, abs=0.01)
