@@ -283,7 +283,7 @@ def random_on_cone(count, seed=0):
 
 
 def test_a_tip_that_is_cut_off_is_a_doubt_though_no_plane_is_far_from_the_surface():
-    for seed, status in ((4, "uncertain"), (7, "ok")):
+    for seed, status in ((6, "uncertain"), (7, "ok")):
         atlas = core.atlas_of([random_on_cone(1200, seed)])
         off = abs(atlas.distance([(0.0, 0.0, 1.0)])[0][0])
         assert (off > measured.MOST_OFF) == (status == "uncertain")
