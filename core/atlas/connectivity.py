@@ -31,11 +31,12 @@ def connected_pieces(i: Indices, j: Indices, count: int) -> tuple[int, Indices]:
 
 
 def graph_of(links: Indices) -> Any:
-    """The sparse matrix (n, n) of bool whose row i has the nodes links[i], of (n, k), each once."""
+    """The sparse matrix (n, n) of bool of links between nodes i and links[i], of (n, k), both ways."""
     from scipy.sparse import coo_array
 
     n, k = links.shape
-    return coo_array((np.ones(n * k, dtype=bool), (np.arange(n).repeat(k), links.ravel())), (n, n)).tocsr()
+    ways = coo_array((np.ones(n * k, dtype=bool), (np.arange(n).repeat(k), links.ravel())), (n, n)).tocsr()
+    return ways.maximum(ways.T)
 
 
 def pieces_of(graph: Any, some: Indices) -> Indices:

@@ -431,15 +431,14 @@ class _Cloud(NamedTuple):
     def explains(self, r: Reconstruction, some: Indices) -> bool:
         """Whether a patch explains some of the contacts, to which it was fitted, within their noise.
 
-        What noise hides at each contact, such as a low step, the mean of neighbors shows.
+        What noise hides at each contact, such as a low step, the mean of neighbors shows. Contacts that are
+        too far off do not count in it: otherwise a single one hides the step.
         """
-        links, off = self.graph[some], np.zeros(len(self.contacts.points))
-        off[some] = self.distances(r, some)
+        links, off = self.graph[some][:, some], self.distances(r, some)
         far = too_far(off, self.noise)
-        if far.any():  # These pull the patch, and means around them are off, too.
-            return are_few(far[some], links @ far)
-        sums, counts = off[some] + links @ off, 1 + links.sum(axis=1)
-        return not too_far(sums, self.noise * np.sqrt(counts)).any()
+        near = np.where(far, 0.0, off)
+        sums, counts = near + links @ near, 1 + links.sum(axis=1)
+        return are_few(far, links @ far) and not too_far(sums, self.noise * np.sqrt(counts)).any()
 
     def distances(self, r: Reconstruction, some: Indices) -> Array:
         """Distances (n,) of some of the contacts from a patch, measured from its tangent planes."""
