@@ -160,12 +160,7 @@ class Atlas(Judged):
     @cached_property
     def edges(self) -> list[Edge]:
         """All pairs of patches that share a boundary, each with this boundary."""
-        return result_of(edges_of(self.charts))
-
-    def bounding(self) -> Generator[float, None, None]:
-        """Finds `edges` in steps: yields the share that is done."""
-        if "edges" not in vars(self):
-            vars(self)["edges"] = yield from edges_of(self.charts)  # where cached_property looks
+        return edges_of(self.charts, self.reference.mesh)
 
     def bends(self, edge: Edge) -> tuple[Array, Array]:
         """Gaussian curvatures (2, m) of both patches along their boundary, and standard deviations (2, m).

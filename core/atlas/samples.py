@@ -78,9 +78,9 @@ def samples_of(charts: Charts, pitch: float) -> Generator[float, None, Samples]:
     square = np.arange(len(patch)).repeat(few[patch] ** 2)
     patch, middles, others, thickness = patch[square], middles[:, square], others[square], thickness[square]
     yield 0.0
-    index = np.divmod(np.arange(len(square)) - np.searchsorted(square, square), few[patch])
+    inner = np.divmod(np.arange(len(square)) - np.searchsorted(square, square), few[patch])
     half /= few
-    x, y = middles + half[patch] * (2 * np.array(index) + 1 - few[patch])
+    x, y = middles + half[patch] * (2 * np.array(inner) + 1 - few[patch])
     yield 0.0
     columns = patch, x, y, (2.0 * half * charts.radii)[patch] ** 2, others, thickness
     return Samples._make((yield from chunked(partial(_samples, charts), PLACES_AT_ONCE, 0.0, *columns)))

@@ -405,17 +405,6 @@ def test_the_graph_as_data_survives_json_and_is_that_of_the_atlas(ball, most):
         assert (d["uncovered"], d["next_touch"]) == ([], None)
 
 
-def test_edges_in_steps_are_the_edges(ring):
-    again = replace(ring)
-    shares = list(again.bounding())
-    assert shares == sorted(shares)
-    assert len(shares) >= len(ring.patches)
-    assert shares[-1] == 1.0
-    assert "edges" in vars(again)
-    assert [e.nodes for e in again.edges] == [e.nodes for e in ring.edges]
-    assert list(again.bounding()) == []
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("when", ["joining", "again"])
 def test_false_while_patches_are_joined_ends_the_touching(when):
