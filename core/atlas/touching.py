@@ -8,17 +8,17 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, number, unit_vector
-from ..contours.contour import Vector, along, cross, tangent_of, vector_of
+from ..contours.contour import tangent_of, vector_of
 from ..contours.finger import Contact, Surface
 from ..contours.tracking import generator_of
 from ..exploration.extent import Exploration
 from ..exploration.options import ExplorationOptions
 from ..exploration.side_by_side import exploring_many
 from ..steps import part_of, result_of
-from ..triangles import far_apart, row_dot
+from ..triangles import far_apart, normalized, row_dot
 from .borders import felt_border, snapped_to_border
 from .charts import Charts
 from .finger import FACING, Finger, finger_at
@@ -38,7 +38,7 @@ NARROW = 1.0  # Where a touch was in vain before, a patch needs a radius of only
 SIDE_BY_SIDE = 8  # This many touches at once are faster, and still done in a tenth of a second.
 NEAR = 3.0  # A patch ends where the surface is off it by more tolerances.
 AGAIN = 5  # Where something is missing or less certain, touches go on at most this often.
-CHECKS, CHECK_SEED = 512, 0  # This many rays from outside check the surface.
+CHECKS = 512  # This many rays from outside check the surface.
 SHARPEST, SPIKES = 64, 16  # This many go to its sharpest vertices, and to the triangles around the sharpest.
 # This many go to its least certain vertices. Without them, and with three rounds AGAIN, 3 of 39 runs on cones
 UNSURE = 128  # and chamfered boxes are "ok" and off by up to 4 tolerances.
@@ -230,29 +230,17 @@ class _Run:
 
     def check(self, reference: ReferenceMesh) -> Generator[float, None, Check]:
         """Contacts of a finger that comes from outside all round, and places of the mesh that it misses."""
-        starts, aims, facing, length = rays_at(reference)
+        starts, aims, ups, length = rays_at(reference)
         yield 1.0
-        ways = (aims - starts) / np.linalg.norm(aims - starts, axis=1, keepdims=True)
-        contacts, missed, at_random, met = [], [], 0, self.frontier.finger.met
-        for i, (start, way, aim) in enumerate(zip(starts, ways, aims, strict=True)):
-            contact = met(vector_of(start), vector_of(way), length)
-            if contact is not None:
-                contacts.append(contact)
-                at_random += i < CHECKS
-            elif i < len(facing) and facing[i] and not self._is_near(vector_of(aim), vector_of(way)):
-                missed.append(aim)
-        points, normals = np.array(contacts).reshape(-1, 2, 3).transpose(1, 0, 2)
-        return Check(points, normals, np.array(missed).reshape(-1, 3), at_random)
-
-    def _is_near(self, aim: Vector, way: Vector) -> bool:
-        """Whether the finger meets something near a place if it comes a tolerance aside of the way there."""
-        across = tangent_of(way, None)
-        near, start = self.frontier.near, along(aim, way, -self.frontier.near)
-        for aside in (across, cross(way, across)):
-            for length in (-self.tolerance, self.tolerance):
-                if self.frontier.finger.met(along(start, aside, length), way, 2.0 * near) is not None:
-                    return True
-        return False
+        finger, ways = self.frontier.finger, normalized(aims - starts)
+        met = [finger.met(vector_of(p), vector_of(way), length) for p, way in zip(starts, ways, strict=True)]
+        contacts = np.array([contact for contact in met if contact is not None]).reshape(-1, 2, 3)
+        has_met = np.array([contact is not None for contact in met])
+        # A ray may slip between two faces of a mesh, but hardly twice.
+        left = np.flatnonzero(~has_met[: len(ups)] & ups.any(axis=1))
+        near = [finger.near(vector_of(aims[i]), vector_of(ups[i]), self.frontier.near, FACING) for i in left]
+        missed = [i for i, contact in zip(left, near, strict=True) if contact is None]
+        return Check(contacts[:, 0], contacts[:, 1], aims[missed], int(has_met[:CHECKS].sum()))
 
     def atlas(
         self, earlier: dict[int, tuple[int, Table]]
@@ -312,16 +300,16 @@ class _Run:
         return self.frontier.felt_near(mesh.vertices[places], normals[places])
 
 
-def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], float]:
+def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, Array, float]:
     """Rays that check a mesh from outside all round: their starts, and places that they go to, (k, 3).
 
-    Also whether each of the first CHECKS / 2 must meet something there, (CHECKS / 2,), see STRAIGHT, and the
-    length of all, which ends beyond the mesh. The first CHECKS are random: one half goes to middles of
-    triangles, the other to any place near the mesh. Others go to the SHARPEST vertices, whose triangles have
-    the least sum of angles there, to the UNSURE ones of the largest deviation, and straight down to triangles
-    around SPIKES of the sharpest.
+    Also the normals (CHECKS / 2, 3) at the first of these, 0 where a ray need not meet anything, see
+    STRAIGHT, and the length of all, which ends beyond the mesh. The first CHECKS are random: one half goes to
+    middles of triangles, the other to any place near the mesh. Others go to the SHARPEST vertices, whose
+    triangles have the least sum of angles there, to the UNSURE ones of the largest deviation, and straight
+    down to triangles around SPIKES of the sharpest.
     """
-    rng, mesh = np.random.default_rng(CHECK_SEED), reference.mesh
+    rng, mesh = np.random.default_rng(0), reference.mesh
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     middle, far = 0.5 * (low + high), float(np.linalg.norm(high - low))
     away = rng.normal(size=(CHECKS, 3))
@@ -332,8 +320,9 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
     aims[: CHECKS // 2] = centers[aimed]
     ways = (aims - middle - away)[: CHECKS // 2]
     # The triangle's own normal counts: that of a vertex on a crease is between those of its sheets.
-    ahead = row_dot(reference.normals[aimed], ways)
-    facing = ahead < -STRAIGHT * np.linalg.norm(ways, axis=1)
+    normals = reference.normals[aimed]
+    facing = row_dot(normals, ways) < -STRAIGHT * np.linalg.norm(ways, axis=1)
+    ups = np.where(facing[:, None], normals, 0.0)
     sharpest = np.argsort(np.where(reference.is_open, np.inf, reference.angles), kind="stable")[:SHARPEST]
     unsure = np.argsort(np.where(reference.is_open, 0.0, -mesh.std), kind="stable")[:UNSURE]
     some = np.append(sharpest, unsure)
@@ -343,7 +332,7 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
     around = around[np.linalg.norm(reference.normals[around], axis=1) > STRAIGHT]  # The others have no area.
     down = far * reference.normals[around]
     starts = np.vstack([middle + away, mesh.vertices[some] + up, centers[around] + down])
-    return starts, np.vstack([aims, mesh.vertices[some], centers[around]]), facing, 3.0 * far
+    return starts, np.vstack([aims, mesh.vertices[some], centers[around]]), ups, 3.0 * far
 
 
 def _joined_and_refined(run: _Run) -> Steps:
