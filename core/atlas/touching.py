@@ -236,10 +236,12 @@ class _Run:
         met = [finger.met(vector_of(p), vector_of(way), length) for p, way in zip(starts, ways, strict=True)]
         contacts = np.array([contact for contact in met if contact is not None]).reshape(-1, 2, 3)
         has_met = np.array([contact is not None for contact in met])
-        # A ray may slip between two faces of a mesh, but hardly twice.
-        left = np.flatnonzero(~has_met[: len(ups)] & ups.any(axis=1))
-        near = [finger.near(vector_of(aims[i]), vector_of(ups[i]), self.frontier.near, FACING) for i in left]
-        missed = [i for i, contact in zip(left, near, strict=True) if contact is None]
+        missed = []
+        for i in np.flatnonzero(~has_met[: len(ups)] & ups.any(axis=1)):
+            aim, up = vector_of(aims[i]), vector_of(ups[i])
+            # Near a rim, or where a ray slips between two faces of a mesh, something is near.
+            if len(finger.disk(aim, up, tangent_of(up, None), self.frontier.near)) == 1:
+                missed.append(i)
         return Check(contacts[:, 0], contacts[:, 1], aims[missed], int(has_met[:CHECKS].sum()))
 
     def atlas(
