@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from ..contours.contour import vector_of
 from ..contours.finger import Contact
-from ..triangles import LEAST_DIVISOR, normalized, row_dot, triangle_cross
+from ..triangles import LEAST_DIVISOR, SAME, normalized, row_dot, triangle_cross
 from .connectivity import Indices
 from .finger import Finger
 from .meshing import Mesh
@@ -35,7 +35,6 @@ ALONG = 0.5  # Ways agree if the cosine of the angle between them is more.
 NEAREST = 12  # The nearest segment is one of this many whose middles are nearest.
 # Sides of the border below this share of an edge are one place: with 1e-6 the triangle of one turns over at a
 SHORT = 0.01  # notch of an open sheet under SkylakeX (test_borders).
-SAME = 1e-6  # Lengths that differ by a smaller share are the same.
 
 PLACES_AT_ONCE = 1000  # A step feels this many places.
 

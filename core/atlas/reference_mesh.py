@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import Vector
-from ..triangles import closest_point, normalized, row_dot, triangle_cross
+from ..triangles import SAME, closest_point, normalized, row_dot, triangle_cross
 from .charts import Charts
 from .connectivity import Indices
 from .field import Blend, sheet_facing
@@ -21,7 +21,6 @@ from .meshing import Mesh
 
 # python -m benchmarks.atlas judges these.
 NEAREST = 3  # The nearest triangle is looked for at this many of the nearest vertices.
-SAME = 1e-6  # Triangles that are nearer by a smaller share of the distance are as near.
 AHEAD = 0.95  # The normal at a foot gives the sign if the cosine of its angle to the way there is more.
 SAGITTA = 0.5  # The surface is within this share of an edge of a place on the mesh.
 PREPARED = ("tree", "fans", "edge", "normals", "is_open", "angles")  # Each is found once for a mesh.

@@ -25,7 +25,7 @@ from .finger import FACING, Finger, finger_at
 from .frontier import Frontier
 from .join import Table, refit
 from .meshing import Mesh
-from .object_atlas import LIMIT, Atlas, Check, joined_surface
+from .object_atlas import LIMIT, NEAR, Atlas, Check, joined_surface
 from .reference_mesh import ReferenceMesh
 
 # python -m benchmarks.atlas judges these.
@@ -36,14 +36,12 @@ AWAY, EVERY = 30.0, 3  # up to this many tolerances away, at every third place o
 SMALL = 5.0  # Touches do not go on from a patch whose radius is below this many tolerances.
 NARROW = 1.0  # Where a touch was in vain before, a patch needs a radius of only this many tolerances.
 SIDE_BY_SIDE = 8  # This many touches at once are faster, and still done in a tenth of a second.
-NEAR = 3.0  # A patch ends where the surface is off it by more tolerances.
 AGAIN = 5  # Where something is missing or less certain, touches go on at most this often.
 CHECKS = 512  # This many rays from outside check the surface.
 SHARPEST, SPIKES = 64, 16  # This many go to its sharpest vertices, and to the triangles around the sharpest.
 # This many go to its least certain vertices. Without them, and with three rounds AGAIN, 3 of 39 runs on cones
 UNSURE = 128  # and chamfered boxes are "ok" and off by up to 4 tolerances.
 STRAIGHT = 0.5  # A ray must meet what it is aimed at if the cosine between it and the normal is more.
-JOINED = 0.5  # Joining is this share of the way to a surface that is checked.
 BORDERS = 2  # This often a mesh is moved to the borders that are felt.
 AGAIN_APART = 0.5  # Touches that improve the joined surface are this many radii apart.
 LARGER = 2.0  # A touch reaches at most this many radii of the patch from which it goes on.
@@ -252,9 +250,9 @@ class _Run:
         These are where the joined surface ends though the object goes on, where a finger from outside meets
         something else, and where the surface is less certain than the tolerance.
         """
-        charts = yield from part_of(self.joining(earlier), 0.0, JOINED)
+        charts = yield from part_of(self.joining(earlier), 0.0, 0.5)
         patches = tuple(e.result for e in self.found)
-        reference = yield from part_of(joined_surface(patches, charts, self.tolerance, self.off), JOINED, 1.0)
+        reference = yield from part_of(joined_surface(patches, charts, self.tolerance, self.off), 0.5, 1.0)
         yield 1.0
         assert reference.unfelt is not None
         unfelt = yield from self.frontier.unfelt(reference.unfelt)
