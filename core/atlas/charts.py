@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..triangles import normalized, row_dot
-from .cubic_spline import CUBIC, SIDE, bspline_weights
+from .cubic_spline import CUBIC, SIDE, bspline_weights, cubics
 
 # python -m benchmarks.atlas judges these.
 MARGIN = 1.12  # A patch counts to this share of its domain's radius: at a crease it ends a step early.
 AZIMUTHS = 96  # The radius of a domain is stored in this many directions.
 REACH = 0.5  # A patch is evaluated at places up to this share of its radius above or below it.
+# Weights of four neighbors (Catmull and Rom 1974), by the share of the way between the middle two.
+CATMULL_ROM = np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]]) / 2.0
 ASIDE = 0.3  # What is farther than this share of the radius off the normal at its foot has no foot.
 FLAT = 0.15  # A patch is flat if it is nowhere steeper than this slope to its own plane.
 STEEPEST = 0.4  # Where a patch is steeper, this cosine to its own plane, it has no feet: heights run away.
@@ -112,11 +114,18 @@ class Charts:
         return np.ascontiguousarray(self.origins.T), np.ascontiguousarray(axes)
 
     def shares(self, x: Array, y: Array, patch: NDArray[np.intp]) -> Array:
-        """How far out local (x, y) are, as shares (m,) of the domain's radius, which is linear in between."""
-        at = np.arctan2(y, x) * (AZIMUTHS / (2.0 * np.pi))
-        first = np.floor(at).astype(np.intp)
-        one, other = self.rims[patch, first], self.rims[patch, (first + 1) % AZIMUTHS]
-        return np.hypot(x, y) / np.maximum(one + (at - first) * (other - one), 1e-6)
+        """How far out local (x, y) are, as shares (m,) of the domain's radius; smooth in the azimuth."""
+        at = np.arctan2(y, x) * (AZIMUTHS / (2.0 * np.pi)) + 0.5 * AZIMUTHS
+        first = at.astype(np.intp)
+        four = self._padded_rims.take(patch * (AZIMUTHS + 4) + first + np.arange(4)[:, None])
+        radius = np.einsum("km,km->m", four, cubics(CATMULL_ROM, at - first))
+        return np.sqrt(x * x + y * y) / np.maximum(radius, 1e-6)
+
+    @cached_property
+    def _padded_rims(self) -> Array:
+        """The radii of domains from azimuth -pi to pi, and one before and two more after these."""
+        around = np.arange(-1, AZIMUTHS + 3) - AZIMUTHS // 2
+        return np.take(self.rims, around, axis=1, mode="wrap").ravel()
 
     def _pairs_at(
         self,

@@ -43,6 +43,14 @@ def bspline_weights(at: Array) -> tuple[Any, Array, Array]:
     """
     at = np.minimum(np.maximum(at + 0.5 * (SIDE - 1), 1.0), SIDE - 2.0 - EDGE_ROUNDING)
     knot = at.astype(np.intp)
-    t = at - knot
-    both = np.tensordot(VALUES_AND_SLOPES, np.stack([np.ones_like(t), t, t * t, t * t * t]), 1)
+    both = cubics(VALUES_AND_SLOPES, at - knot)
     return knot, both[:4], both[4:]
+
+
+def cubics(coefficients: Array, t: Array) -> Array:
+    """Cubic polynomials at t (...), (k, ...); coefficients (k, 4) are those of 1, t, t^2 and t^3."""
+    powers = np.empty((4, *t.shape))
+    powers[0], powers[1] = 1.0, t
+    np.multiply(t, t, out=powers[2])
+    np.multiply(powers[2], t, out=powers[3])
+    return (coefficients @ powers.reshape(4, t.size)).reshape(len(coefficients), *t.shape)
