@@ -211,7 +211,8 @@ def _sums(quads: Indices, places: Array, planes: Blend) -> Array:
     squares, along = (n[:, :, None] * n[:, None]).reshape(-1, 9), row_dot(n, places)[:, None] * n
     weights = np.where(planes.patch < 0, LEVEL, 1.0)[:, None]
     terms = weights * np.column_stack([np.ones(len(n)), places, n, squares, along])
-    around = csr_array((np.ones(quads.size), quads.ravel(), np.arange(0, quads.size + 1, 4)))
+    shape = len(quads), int(quads.max(initial=-1)) + 1
+    around = csr_array((np.ones(quads.size), quads.ravel(), np.arange(0, quads.size + 1, 4)), shape)
     sums: Array = around.T @ terms
     return sums
 
