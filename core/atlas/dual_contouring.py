@@ -82,11 +82,12 @@ def dual_contour(charts: Charts, indicator: Indicator, pitch: float) -> Generato
     cells, index = np.unique(quads, return_inverse=True)
     quads = index.reshape(-1, 4)
     yield 0.7
-    sums = _sums(quads, places, planes)
-    vertices, up = _vertices(sums, lattice.places(cells) + 0.5 * pitch, pitch)
+    around = np.arange(len(quads)).repeat(4), quads.ravel()
+    vertices, up = _vertices(*around, places, planes, lattice.places(cells) + 0.5 * pitch, pitch)
     quads, bent = _cut(vertices, quads, planes.normal, pitch)
-    some = quads[bent]
-    middles = _vertices(sums[some].sum(axis=1), vertices[some].mean(axis=1), pitch)
+    middles = _vertices(
+        *_planes_around(quads, bent), places, planes, vertices[quads[bent]].mean(axis=1), pitch
+    )
     vertices, up = (np.concatenate(both) for both in zip((vertices, up), middles, strict=True))
     yield 0.8
     own = planes.at(np.append(_least_uncertain(quads, planes, len(cells)), bent))
@@ -197,34 +198,27 @@ def _least_uncertain(quads: Indices, planes: Blend, count: int) -> Indices:
     return best
 
 
-def _sums(quads: Indices, places: Array, planes: Blend) -> Array:
-    """Weighted sums (m, 19) over the planes around each cell, from which follows its vertex.
-
-    They are of 1, the places (3) where planes cross edges, and normals n (3), n n' (9) and n times the
-    distances of planes from 0 (3).
-
-    quads : (n, 4), the cells around each plane
-    """
-    from scipy.sparse import csr_array
-
-    n = planes.normal
-    squares, along = (n[:, :, None] * n[:, None]).reshape(-1, 9), row_dot(n, places)[:, None] * n
-    weights = np.where(planes.patch < 0, LEVEL, 1.0)[:, None]
-    terms = weights * np.column_stack([np.ones(len(n)), places, n, squares, along])
-    shape = len(quads), int(quads.max(initial=-1)) + 1
-    around = csr_array((np.ones(quads.size), quads.ravel(), np.arange(0, quads.size + 1, 4)), shape)
-    sums: Array = around.T @ terms
-    return sums
-
-
-def _vertices(sums: Array, centers: Array, pitch: float) -> tuple[Array, Array]:
+def _vertices(
+    plane: Indices, cell: Indices, places: Array, planes: Blend, centers: Array, pitch: float
+) -> tuple[Array, Array]:
     """The vertices (m, 3) of cells with centers (m, 3), and mean normals (m, 3) there.
 
     They minimize the squares of distances to planes, from the mean of the places where these cross edges.
+
+    plane, cell : (k,), which of the planes (n,) through places (n, 3) are around which cell
     """
-    middle, up, square, right = np.split(sums[:, 1:] / sums[:, :1], [3, 6, 15], axis=1)
-    square = square.reshape(-1, 3, 3)
-    right = right - np.einsum("mij,mj->mi", square, middle)
+    count, normals = len(centers), planes.normal
+    weights = np.where(planes.patch < 0, LEVEL, 1.0)[plane]
+    total = np.bincount(cell, weights, count)
+
+    def mean(values: Array) -> Array:
+        """Means (m, i) of values (n, i) over the planes around each cell."""
+        sums = [np.bincount(cell, weights * column[plane], count) for column in values.T]
+        return np.stack(sums, axis=1) / total[:, None]
+
+    middle, up = mean(places), mean(normals)
+    square = mean((normals[:, :, None] * normals[:, None]).reshape(-1, 9)).reshape(-1, 3, 3)
+    right = mean(row_dot(normals, places)[:, None] * normals) - np.einsum("mij,mj->mi", square, middle)
     # The step s minimizes |square s - right|^2 + SOFT^2 |s|^2, and again from there (iterated Tikhonov
     # regularization): it keeps what SOFT takes off where planes meet, and still does not move along them.
     soft = square @ square + SOFT**2 * np.eye(3)
@@ -270,6 +264,20 @@ def _cut(vertices: Array, quads: Indices, normals: Array, pitch: float) -> tuple
     a, b, c, d = vertices[quads.T]
     apart = np.abs(row_dot(a + c - b - d, normalized(np.cross(c - a, d - b))))
     return quads, np.flatnonzero(apart > 2.0 * BENT * pitch)
+
+
+def _planes_around(quads: Indices, bent: Indices) -> tuple[Indices, Indices]:
+    """The planes (k,) around the four cells of bent quadrilaterals (m,), and for each which of these it is.
+
+    quads : (n, 4), the cells around each plane
+    """
+    from scipy.sparse import csr_array
+
+    ends = np.arange(0, 4 * len(quads) + 1, 4)
+    shape = len(quads), int(quads.max(initial=0)) + 1
+    cells = csr_array((np.ones(4 * len(quads)), quads.ravel(), ends), shape)
+    shared = (cells[bent] @ cells.T).tocoo()
+    return shared.col, shared.row
 
 
 def _triangles(quads: Indices, bent: Indices, first: int) -> tuple[Indices, Indices]:

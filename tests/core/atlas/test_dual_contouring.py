@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import label
 
 import core
-from core.atlas.dual_contouring import _on_sheet, _sides, _sums, _vertices, dual_contour
+from core.atlas.dual_contouring import _on_sheet, _sides, _vertices, dual_contour
 from core.atlas.field import Blend
 from core.atlas.indicator import Indicator
 from core.atlas.join import charts_of
@@ -80,8 +80,8 @@ def test_a_vertex_is_where_walls_meet_but_stays_where_they_hardly_turn(turn, x):
     places = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.2]])
     normals = np.array([[0.0, 0.0, 1.0], [np.sin(turn), 0.0, np.cos(turn)]])
     planes = Blend(np.zeros(2), np.zeros(2), normals, np.zeros(2, dtype=np.intp), np.zeros(2))
-    sums = _sums(np.zeros((2, 4), dtype=np.intp), places, planes)
-    vertices, _ = _vertices(sums, np.zeros((1, 3)), 1.0)
+    both, one = np.arange(2), np.zeros(2, dtype=np.intp)
+    vertices, _ = _vertices(both, one, places, planes, np.zeros((1, 3)), 1.0)
     assert vertices[0, 0] == pytest.approx(x, abs=0.05)
 
 
