@@ -115,11 +115,18 @@ def nearest_sheet(charts: Charts, pairs: Pairs, count: int) -> Blend:
     return _weighted_mean(pairs, node_weights(charts, pairs) * alike, count)
 
 
-def covered(charts: Charts, points: Array, normals: Array) -> NDArray[np.bool_]:
-    """Which of the places (k, 3) lie on a patch that faces the way of their normals (k, 3)."""
+def covered(
+    charts: Charts, points: Array, normals: Array, share: float = INSIDE, first: int = 0
+) -> NDArray[np.bool_]:
+    """Which of the places (k, 3) lie on a patch that faces the way of their normals (k, 3).
+
+    share : of the domain's radius, within which they lie
+    first : the number of the first patch that counts
+    """
     pairs = charts.pairs(points)
     near = np.abs(pairs.distance) < LAYER * charts.radii[pairs.patch]
-    on = (pairs.rho < INSIDE) & near & (_facing(charts, pairs, normals[pairs.point_index]) > 0.0)
+    on = (pairs.rho < share) & near & (_facing(charts, pairs, normals[pairs.point_index]) > 0.0)
+    on &= pairs.patch >= first
     return np.bincount(pairs.point_index[on], minlength=len(points)) > 0
 
 

@@ -21,6 +21,7 @@ from ..steps import part_of, result_of
 from ..triangles import far_apart, normalized, row_dot
 from .borders import felt_border, snapped_to_border
 from .charts import Charts
+from .field import covered
 from .finger import FACING, Finger, finger_at
 from .frontier import Frontier
 from .join import Table, refit
@@ -215,15 +216,20 @@ class _Run:
         return (yield from refit(contours, results, self.frontier.charts, self.options.noise, earlier))
 
     def going_on(self, contacts: Sequence[PointNormal], farthest: float) -> Generator[Progress, object, None]:
-        """Touches at contacts that are far enough apart, and all over from there."""
-        points = np.array([point for point, _ in contacts])
-        apart = [contacts[i] for i in far_apart(points, AGAIN_APART * farthest)][: self.most - self.done]
-        for start in range(0, len(apart), SIDE_BY_SIDE):
-            few = apart[start : start + SIDE_BY_SIDE]
-            new = yield from self.showing(self.touching(few, farthest, [NARROW] * len(few)))
+        """Touches at contacts, and all over from there.
+
+        Of contacts that are near each other only the first is touched, unless its patch leaves others out.
+        """
+        points, normals = (np.array(values) for values in zip(*contacts, strict=True))
+        left, first = np.arange(len(points)), len(self.found)
+        while len(left) and self.done < self.most and not self.is_stopped:
+            few = left[far_apart(points[left], AGAIN_APART * farthest)]
+            few = few[: min(SIDE_BY_SIDE, self.most - self.done)]
+            some = list(zip(points[few], normals[few], strict=True))
+            new = yield from self.showing(self.touching(some, farthest, [NARROW] * len(some)))
+            left = np.setdiff1d(left, few)
+            left = left[~covered(self.frontier.charts, points[left], normals[left], AGAIN_APART, first)]
             yield from self.show(self.now(new=new))
-            if self.is_stopped:
-                break
         yield from _all_over(self)
 
     def check(self, reference: ReferenceMesh) -> Generator[float, None, Check]:
