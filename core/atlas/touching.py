@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, number, unit_vector
 from ..contours.contour import tangent_of, vector_of
@@ -234,17 +234,17 @@ class _Run:
 
     def check(self, reference: ReferenceMesh) -> Generator[float, None, Check]:
         """Contacts of a finger that comes from outside all round, and places of the mesh that it misses."""
-        starts, aims, ups, length = rays_at(reference)
+        starts, aims, facing, length = rays_at(reference)
         yield 1.0
         finger, ways = self.frontier.finger, normalized(aims - starts)
         met = [finger.met(vector_of(p), vector_of(way), length) for p, way in zip(starts, ways, strict=True)]
         contacts = np.array([contact for contact in met if contact is not None]).reshape(-1, 2, 3)
         has_met = np.array([contact is not None for contact in met])
         missed = []
-        for i in np.flatnonzero(~has_met[: len(ups)] & ups.any(axis=1)):
-            aim, up = vector_of(aims[i]), vector_of(ups[i])
+        for i in np.flatnonzero(~has_met[: len(facing)] & facing):
+            aim, back = vector_of(aims[i]), vector_of(-ways[i])
             # Near a rim, or where a ray slips between two faces of a mesh, something is near.
-            if len(finger.disk(aim, up, tangent_of(up, None), self.frontier.near)) == 1:
+            if len(finger.disk(aim, back, tangent_of(back, None), self.frontier.near)) == 1:
                 missed.append(i)
         return Check(contacts[:, 0], contacts[:, 1], aims[missed], int(has_met[:CHECKS].sum()))
 
@@ -306,11 +306,11 @@ class _Run:
         return self.frontier.felt_near(mesh.vertices[places], normals[places])
 
 
-def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, Array, float]:
+def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], float]:
     """Rays that check a mesh from outside all round: their starts, and places that they go to, (k, 3).
 
-    Also the normals (CHECKS / 2, 3) at the first of these, 0 where a ray need not meet anything, see
-    STRAIGHT, and the length of all, which ends beyond the mesh. The first CHECKS are random: one half goes to
+    Also whether each of the first CHECKS / 2 must meet something there, (CHECKS / 2,), see STRAIGHT, and the
+    length of all, which ends beyond the mesh. The first CHECKS are random: one half goes to
     middles of triangles, the other to any place near the mesh. Others go to the SHARPEST vertices, whose
     triangles have the least sum of angles there, to the UNSURE ones of the largest deviation, and straight
     down to triangles around SPIKES of the sharpest.
@@ -326,9 +326,8 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, Array, float]:
     aims[: CHECKS // 2] = centers[aimed]
     ways = (aims - middle - away)[: CHECKS // 2]
     # The triangle's own normal counts: that of a vertex on a crease is between those of its sheets.
-    normals = reference.normals[aimed]
-    facing = row_dot(normals, ways) < -STRAIGHT * np.linalg.norm(ways, axis=1)
-    ups = np.where(facing[:, None], normals, 0.0)
+    ahead = row_dot(reference.normals[aimed], ways)
+    facing = ahead < -STRAIGHT * np.linalg.norm(ways, axis=1)
     sharpest = np.argsort(np.where(reference.is_open, np.inf, reference.angles), kind="stable")[:SHARPEST]
     unsure = np.argsort(np.where(reference.is_open, 0.0, -mesh.std), kind="stable")[:UNSURE]
     some = np.append(sharpest, unsure)
@@ -338,7 +337,7 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, Array, float]:
     around = around[np.linalg.norm(reference.normals[around], axis=1) > STRAIGHT]  # The others have no area.
     down = far * reference.normals[around]
     starts = np.vstack([middle + away, mesh.vertices[some] + up, centers[around] + down])
-    return starts, np.vstack([aims, mesh.vertices[some], centers[around]]), ups, 3.0 * far
+    return starts, np.vstack([aims, mesh.vertices[some], centers[around]]), facing, 3.0 * far
 
 
 def _joined_and_refined(run: _Run) -> Steps:
