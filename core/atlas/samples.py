@@ -18,13 +18,15 @@ from .indicator import LAYERS, Indicator, solve_poisson
 
 # python -m benchmarks.atlas judges these.
 PITCH = 1.2  # Samples of a patch are this many cells apart.
-ACROSS = 12  # The weights of other patches are computed at this many places along and across a patch.
+# The weights of other patches are computed once for up to PARTS^2 samples; a patch has ACROSS^2 or more.
+ACROSS, PARTS = 12, 8
 DENSER = 0.5  # Where walls need cells finer than this share, samples are taken again.
 FINEST, COARSEST = 1.0 / 400.0, 1.0 / 80.0  # Cells are between these shares of the size.
 TOLERANCES = 5.0  # A cell is at most this many tolerances.
 OPPOSITE = -0.9  # Two patches are the sides of a wall or gap if the cosine between their normals is less.
 THIN_SHARE = 0.003  # Walls are at least as thick as all but this share of the area is.
 CERTAIN = 5.0  # Two sides that are nearer than this many deviations are no wall or gap.
+PATCHES_AT_ONCE = 20  # A step takes this many patches.
 
 
 def indicated(charts: Charts, tolerance: float | None) -> Generator[float, None, Indicator]:
@@ -66,24 +68,52 @@ class Samples(NamedTuple):
 def samples_of(charts: Charts, pitch: float) -> Generator[float, None, Samples]:
     """Points of all patches at most `pitch` apart, with the share of the area there that is theirs; yields 0.
 
-    The weights of other patches are smooth over a patch, so they are computed at the middles of ACROSS x
-    ACROSS squares around it, and the samples are evenly spaced in each square.
+    The weights of other patches are smooth over a patch, so they are computed once for many samples.
     """
-    patch, *index = np.indices((len(charts.radii), ACROSS, ACROSS)).reshape(3, -1)
-    half = charts.widths / ACROSS
-    middles = half[patch] * (2 * np.array(index) + 1 - ACROSS)
-    steps = partial(_overlap_weight_and_thickness, charts)
-    others, thickness = yield from chunked(steps, PLACES_AT_ONCE, 0.0, patch, *middles)
-    few = np.ceil(2.0 * half * charts.radii / pitch).astype(np.intp)  # Samples along each side of a square.
-    square = np.arange(len(patch)).repeat(few[patch] ** 2)
-    patch, middles, others, thickness = patch[square], middles[:, square], others[square], thickness[square]
-    yield 0.0
-    inner = np.divmod(np.arange(len(square)) - np.searchsorted(square, square), few[patch])
-    half /= few
-    x, y = middles + half[patch] * (2 * np.array(inner) + 1 - few[patch])
-    yield 0.0
-    columns = patch, x, y, (2.0 * half * charts.radii)[patch] ** 2, others, thickness
+    half = charts.rims.max(axis=1)
+    across = np.maximum(ACROSS, np.ceil(2.0 * half * charts.radii / pitch).astype(np.intp))
+    patch, x, y, middle, group = yield from _sample_grid(charts, half, across)
+    others, thickness = yield from chunked(
+        partial(_overlap_weight_and_thickness, charts),
+        PLACES_AT_ONCE,
+        0.0,
+        patch[middle],
+        x[middle],
+        y[middle],
+    )
+    flat = ((2.0 * half * charts.radii / across) ** 2)[patch]
+    columns = patch, x, y, flat, others[group], thickness[group]
     return Samples._make((yield from chunked(partial(_samples, charts), PLACES_AT_ONCE, 0.0, *columns)))
+
+
+def _sample_grid(
+    charts: Charts, half: Array, across: NDArray[np.intp]
+) -> Generator[float, None, tuple[NDArray[np.intp], Array, Array, NDArray[np.intp], NDArray[np.intp]]]:
+    """The patches and local x and y of evenly spread samples, (n,) each; yields 0.
+
+    half, across : half the width of a square around each patch, and the number of samples along it
+
+    Also the sample in the middle of each group of neighbors, (g,), and the group of each sample, (n,).
+    """
+    sides = np.maximum(1, np.minimum(across // ACROSS, PARTS))  # Samples of a group, along each axis.
+    places, groups = [], 0
+    for i, (count, few) in enumerate(zip(across.tolist(), sides.tolist(), strict=True)):
+        line = half[i] * ((2.0 * np.arange(count) + 1.0) / count - 1.0)
+        x, y = (axis.ravel() for axis in np.meshgrid(line, line, indexing="ij"))
+        row, column = np.divmod(np.arange(count**2), count)
+        inside = charts.shares(x, y, np.full(len(x), i)) < 1.0
+        group = (row // few * (count // few + 1) + column // few)[inside]
+        aside = np.maximum(np.abs(row % few - few // 2), np.abs(column % few - few // 2))[inside]
+        places.append((np.full(len(group), i), x[inside], y[inside], groups + group, aside))
+        groups += (count // few + 1) ** 2
+        if i % PATCHES_AT_ONCE == 0:
+            yield 0.0
+    patch, x, y, group, aside = (np.concatenate(values) for values in zip(*places, strict=True))
+    _, group = np.unique(group, return_inverse=True)
+    yield 0.0
+    # The sample in the middle of a group is first.
+    order = np.lexsort((aside, group))
+    return patch, x, y, order[np.flatnonzero(np.diff(group[order], prepend=-1))], group
 
 
 def _overlap_weight_and_thickness(
@@ -115,7 +145,7 @@ def _samples(
     """Samples of patches at local (x, y); `flat` are their areas in the tangent planes."""
     points, normals = charts.world(patch, x, y)
     share, steep = charts.shares(x, y, patch), row_dot(normals, charts.axes[patch, :, 2])
-    inside = (share < 1.0) & (steep > STEEPEST)
+    inside = steep > STEEPEST
     own = weights_of(share, charts.radii[patch] * charts.stds_at(x, y, patch) * steep, charts.radii[patch])
     areas = flat * own / (own + others) / np.maximum(steep, STEEPEST)
     return Samples(*(values[inside] for values in (points, normals, areas, thickness)))
