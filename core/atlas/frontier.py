@@ -9,8 +9,8 @@ there meets only what is covered, or nothing.
 import heapq
 import math
 from collections.abc import Generator, Iterator, Sequence
-from dataclasses import dataclass, field
-from operator import attrgetter
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,7 @@ BORDER_APART = 0.5  # The distance between such places, in their radii.
 SLIVER = 0.03  # The blend of patches bridges what is new if it is less than this share of the disk.
 IN_VAIN = 2.0  # What is within this many radii of the least patch of a touch in vain brings nothing, too.
 TRIES = 3  # Touches go on from a place at most this many times.
-LOOK = 16  # This many places that can bring most are looked at together, which is faster.
+LOOK = 15  # This many other places are looked at together with the first of the queue, which is faster.
 ALONG = 0.9  # A direction is along another if the cosine of the angle between them is more.
 TOUCHES_APART = 2.2  # Touches that are made side by side are this many radii apart.
 
@@ -48,22 +48,31 @@ TOUCHES_APART = 2.2  # Touches that are made side by side are this many radii ap
 GAIN_DIGITS = 9  # Gains are areas in the caller's unit, and equal if this many significant digits are.
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class RimPlace:
     """A place on a rim, its normal and the way away from its patch, (3,) each, and the radius of the patch.
 
-    area : what is missing around it, at most a disk of that radius, if that is known
     tried : where touches that went on from it were, (3,) each
     felt : what no patch covers on the disk at a share of REACHES, (k, 2, 3); none once its middle is covered
+    area : what is missing around it, at most a disk of that radius, if that is known
     """
 
     point: Vector
     normal: Vector
     ahead: Vector
     radius: float
-    area: float | None = None
-    tried: list[Vector] = field(default_factory=list)
+    tried: tuple[Vector, ...] = ()
     felt: dict[float, Array] = field(default_factory=dict)
+    area: float | None = None
+
+
+class Next(NamedTuple):
+    """Where to touch, the outward direction, (3,) each, the area that it would bring, and whence."""
+
+    point: Array
+    outward: Array
+    gain: float
+    place: RimPlace
 
 
 @dataclass(eq=False)
@@ -76,8 +85,8 @@ class Frontier:
     taps : these contacts, for each patch
     failed_points : where touches that could not make a patch were, (3,) each
 
-    A touch goes on from the place that can bring most, which is its area. That only shrinks as patches come,
-    so it is measured again only where it is largest.
+    The first place is the one that can bring most. That only shrinks as patches come, so only there it is
+    measured again.
     """
 
     finger: Finger
@@ -88,7 +97,8 @@ class Frontier:
     taps: list[Contour] = field(default_factory=list)
     failed_points: list[Vector] = field(default_factory=list)
     charts: Charts = field(init=False)
-    queue: list[RimPlace] = field(default_factory=list)
+    queue: list[tuple[float, int, RimPlace]] = field(default_factory=list)
+    pushed: int = 0
 
     def add(self, r: Reconstruction, least: float = 0.0, goes_on: float = 0.0) -> bool:
         """Takes in a patch that was felt, and the places of its rim. Returns whether it did.
@@ -102,9 +112,8 @@ class Frontier:
         chart = stacked([r], [tabulate(r, rim, deviations=False)])
         self.charts = self.charts.joined(chart) if self.taps else chart
         self.taps.append(self._felt_between(chart))
-        most = _rounded(np.pi * r.radius**2)
         for p, n, t in zip(*chart.rim(RIM, 1.01 * INSIDE), strict=True) if radius >= goes_on else ():
-            self.queue.append(RimPlace(vector_of(p), vector_of(n), vector_of(t), r.radius, most))
+            self.push(RimPlace(vector_of(p), vector_of(n), vector_of(t), r.radius), np.pi * r.radius**2)
         return True
 
     def _felt_between(self, chart: Charts) -> Contour:
@@ -122,31 +131,41 @@ class Frontier:
         contacts = (self.finger.near(vector_of(p), vector_of(n), self.near) for p, n in places)
         return [contact for contact in contacts if contact is not None]
 
-    def next_touches(self, count: int) -> Generator[None, None, list[tuple[RimPlace, Array]]]:
-        """At most `count` places, far apart, from which a touch brings most, each with its contact (2, 3).
+    def push(self, place: RimPlace, gain: float) -> None:
+        """Queues a place by the area that a touch there may bring."""
+        self.pushed += 1
+        heapq.heappush(self.queue, (-_rounded(gain), self.pushed, place))
 
-        Yields each time before it looks at places.
-        """
+    def tried(self, touch: Next) -> None:
+        """Queues the place of a touch again after the touch was made: something may be left beyond it."""
+        self.push(replace(touch.place, tried=(*touch.place.tried, vector_of(touch.point))), touch.gain)
+
+    def next_touches(self, count: int) -> Generator[None, None, list[Next]]:
+        """At most `count` touches, far apart, that bring most. Yields each time before it looks at places."""
         yield from self._forget_covered()
-        left = self.queue
-        chosen: list[tuple[RimPlace, Array]] = []
-        contacts: dict[RimPlace, Array | None] = {}
-        while left and len(chosen) < count:
-            places = heapq.nlargest(LOOK, left, key=attrgetter("area"))
-            best = places[0]
-            if best not in contacts:
-                yield
-                contacts |= self.beyond([place for place in places if place not in contacts])
+        chosen: list[Next] = []
+        aside: list[tuple[float, int, RimPlace]] = []
+        touches: dict[RimPlace, Next | None] = {}
+        while self.queue and len(chosen) < count:
+            _, _, place = entry = heapq.heappop(self.queue)
+            distances = ((other, TOUCHES_APART * max(place.radius, other.place.radius)) for other in chosen)
+            if any(math.dist(place.point, other.point) < apart for other, apart in distances):
+                aside.append(entry)
                 continue
-            contact = contacts[best]
-            if contact is None:
-                break
-            chosen.append((best, contact))
-            left = [
-                place
-                for place in left
-                if math.dist(place.point, best.point) >= TOUCHES_APART * max(place.radius, best.radius)
-            ]
+            if len(place.tried) >= TRIES:
+                continue
+            if place not in touches:
+                yield
+                others = (other for _, _, other in heapq.nsmallest(LOOK, self.queue) if other not in touches)
+                some = [place, *others]
+                touches.update(zip(some, self.beyond(some), strict=True))
+            touch = touches[place]
+            if touch is not None and self.queue and touch.gain < -self.queue[0][0]:
+                self.push(place, touch.gain)
+            elif touch is not None:
+                chosen.append(touch)
+        for entry in aside:
+            heapq.heappush(self.queue, entry)
         return chosen
 
     def uncovered(
@@ -193,32 +212,31 @@ class Frontier:
         return unfelt
 
     def _forget_covered(self) -> Generator[None, None, None]:
-        """Takes places that patches now cover, or that bring nothing, out of the queue; yields in between."""
-        still: list[RimPlace] = []
+        """Takes the places that patches now cover out of the queue; yields between its steps."""
+        still: list[tuple[float, int, RimPlace]] = []
         for start in range(0, len(self.queue), PLACES_AT_ONCE):
             some = self.queue[start : start + PLACES_AT_ONCE]
-            free = self._free(np.array([(place.point, place.normal) for place in some]))
-            still += [place for place, is_free in zip(some, free, strict=True) if is_free and place.area]
+            free = self._free(np.array([(place.point, place.normal) for _, _, place in some]))
+            still += [entry for entry, is_free in zip(some, free, strict=True) if is_free]
             yield
-        self.queue = [place for place in still if len(place.tried) < TRIES]
+        self.queue = still
+        heapq.heapify(self.queue)
 
-    def beyond(self, places: Sequence[RimPlace]) -> dict[RimPlace, Array | None]:
-        """The contact (2, 3) of the touch that goes on from each place, or None if it would bring nothing.
-
-        The areas of the places become what these touches bring.
-        """
-        contacts: dict[RimPlace, Array | None] = dict.fromkeys(places)
+    def beyond(self, places: Sequence[RimPlace]) -> list[Next | None]:
+        """The touch that goes on from each place, or None if it would bring nothing."""
+        touches: list[Next | None] = [None] * len(places)
         for share in REACHES:
-            left = [place for place, contact in contacts.items() if contact is None]
-            new = [place for place in left if share not in place.felt]
+            left = [i for i, touch in enumerate(touches) if touch is None]
+            some = [places[i] for i in left]
+            new = [place for place in some if share not in place.felt]
             middles = self._uncovered_part([self._ahead(place, share) for place in new])
             for place, middle in zip(new, middles, strict=True):
                 place.felt[share] = self._disk(place, middle, share) if len(middle) else middle
-            disks = self._uncovered_part([place.felt[share] for place in left])
-            for place, disk in zip(left, disks, strict=True):
+            disks = self._uncovered_part([place.felt[share] for place in some])
+            for i, place, disk in zip(left, some, disks, strict=True):
                 place.felt[share] = disk
-                contacts[place] = self._touch(place, share)
-        return contacts
+                touches[i] = self._touch(place, share)
+        return touches
 
     def _ahead(self, place: RimPlace, share: float) -> Array:
         """The contact of the finger that goes on from a place, (1, 2, 3), or none, (0, 2, 3)."""
@@ -247,20 +265,21 @@ class Frontier:
         """Which of the contacts (k, 2, 3) no patch covers."""
         return ~covered(self.charts, contacts[:, 0], contacts[:, 1])
 
-    def _touch(self, place: RimPlace, share: float) -> Array | None:
-        """The contact (2, 3) in the middle of what is uncovered on a felt disk, if that is enough."""
+    def _touch(self, place: RimPlace, share: float) -> Next | None:
+        """The touch in the middle of what is uncovered on a disk that was felt, if it brings enough."""
         hits, disk = place.felt[share], math.pi * (min(1.0, DISK_REACHES * share) * place.radius) ** 2
         if self.failed_points and len(hits):
             apart = ((hits[:, 0, None] - np.array(self.failed_points)) ** 2).sum(axis=2).min(axis=1)
             hits = hits[apart > IN_VAIN**2 * self.least / math.pi]
         area = len(hits) / (DISK_PLACES + 1) * disk
-        is_enough = area > max(SLIVER * disk, self.least)
-        place.area = _rounded(area) if is_enough else 0.0
-        return hits[_between(hits[:, 0], place.tried)] if is_enough else None
+        if area <= max(SLIVER * disk, self.least):
+            return None
+        point, outward = hits[_between(hits[:, 0], place.tried)]
+        return Next(point, outward, _rounded(area), place)
 
 
 def _rounded(gain: float) -> float:
-    """A gain without the digits that differ by rounding, which may not choose between places."""
+    """A gain without the digits that differ by rounding, both where it is compared and where it is queued."""
     return float(f"{gain:.{GAIN_DIGITS - 1}e}")
 
 

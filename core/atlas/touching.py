@@ -115,11 +115,12 @@ def _all_over(run: "_Run") -> Generator[Progress, object, None]:
         chosen = yield from run.showing(run.frontier.next_touches(min(SIDE_BY_SIDE, run.most - run.done)))
         if not chosen or run.is_stopped:
             break
-        farthest = LARGER * max(place.radius for place, _ in chosen)
-        least = [NARROW if place.tried else SMALL for place, _ in chosen]
-        new = yield from run.showing(run.touching([contact for _, contact in chosen], farthest, least))
-        for place, (point, _) in chosen:
-            place.tried.append(vector_of(point))  # Something may be left beyond it.
+        farthest = LARGER * max(touch.place.radius for touch in chosen)
+        contacts = [(touch.point, touch.outward) for touch in chosen]
+        least = [NARROW if touch.place.tried else SMALL for touch in chosen]
+        new = yield from run.showing(run.touching(contacts, farthest, least))
+        for touch in chosen:
+            run.frontier.tried(touch)
         yield from run.show(run.now(new=new))
 
 

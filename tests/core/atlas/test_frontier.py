@@ -9,7 +9,7 @@ import core
 from core.atlas import touching
 from core.atlas.charts import AZIMUTHS
 from core.atlas.finger import Finger
-from core.atlas.frontier import Frontier, _between, _rounded, border_places
+from core.atlas.frontier import Frontier, _between, border_places
 from core.atlas.meshing import Mesh
 from core.atlas.reference_mesh import ReferenceMesh
 from core.steps import result_of
@@ -32,23 +32,26 @@ def frontier(first):
 
 
 def test_places_at_once_have_the_touches_of_single_places(frontier):
-    places = frontier.queue
-    together, areas = frontier.beyond(places), [place.area for place in places]
-    assert len(together) == 24
-    for place, area in zip(places, areas, strict=True):
-        point, outward = together[place]
-        assert (frontier.beyond([place])[place][0] == point).all()
-        assert place.area == area > 0.0
-        assert abs(BALL.distances(point[None])[0]) < 1e-9
-        assert outward == pytest.approx(point, abs=1e-6)
+    places = [place for _, _, place in frontier.queue]
+    together = frontier.beyond(places)
+    singles = [frontier.beyond([place])[0] for place in places]
+    assert len(places) == 24
+    for a, b in zip(together, singles, strict=True):
+        assert a.gain == b.gain > 0.0
+        assert (a.point == b.point).all()
+        assert abs(BALL.distances(a.point[None])[0]) < 1e-9
+        assert a.outward == pytest.approx(a.point, abs=1e-6)
 
 
 def test_after_a_touch_in_vain_the_next_is_elsewhere(frontier):
-    place = frontier.queue[0]
-    point, area = frontier.beyond([place])[place][0], place.area
-    place.tried.append(tuple(point))
-    assert np.linalg.norm(frontier.beyond([place])[place][0] - point) > 0.2 * place.radius
-    assert place.area == area
+    place = frontier.queue[0][2]
+    (touch,) = frontier.beyond([place])
+    frontier.tried(touch)
+    again = frontier.queue[np.argmax([len(p.tried) for _, _, p in frontier.queue])][2]
+    assert again.tried == (tuple(touch.point),)
+    (other,) = frontier.beyond([again])
+    assert other.gain == touch.gain
+    assert np.linalg.norm(other.point - touch.point) > 0.2 * place.radius
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
@@ -63,9 +66,12 @@ def test_of_contacts_that_are_equally_far_but_for_rounding_the_first_is_next(uni
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
-def test_places_that_bring_as_much_but_for_rounding_are_equal(unit):
-    a, b, c = (_rounded(unit * times * np.pi / 3.0) for times in (1.0, 1.0 + 1e-12, 1.0 + 1e-6))
-    assert a == b < c
+def test_of_places_that_bring_as_much_but_for_rounding_the_first_is_next(frontier, unit):
+    places = [place for _, _, place in frontier.queue[:3]]
+    frontier.queue = []
+    for place, times in zip(places, (1.0, 1.0 + 1e-12, 1.0 + 1e-6), strict=True):
+        frontier.push(place, unit * times * np.pi / 3.0)
+    assert [place for _, _, place in sorted(frontier.queue)] == [places[2], *places[:2]]
 
 
 def test_nothing_goes_on_from_a_narrow_patch_and_a_narrower_one_is_left_out(first):
@@ -119,12 +125,11 @@ def test_contacts_between_curves_are_on_the_surface_and_have_the_noise(first):
 
 
 def test_what_is_less_than_a_touch_has_to_bring_is_left(frontier):
-    place = frontier.queue[0]
-    frontier.beyond([place])
+    place = frontier.queue[0][2]
+    (touch,) = frontier.beyond([place])
     frontier.least = 1.01 * np.pi * place.radius**2
-    assert place.area < frontier.least
-    assert frontier.beyond([place]) == {place: None}
-    assert place.area == 0.0
+    assert touch.gain < frontier.least
+    assert frontier.beyond([place]) == [None]
 
 
 class Nothing:

@@ -162,7 +162,7 @@ def test_edges_so_long_that_no_triangle_is_left_are_refused_with_a_sentence(cone
 
 @pytest.mark.long
 def test_the_sharpest_places_are_checked_and_touched_again():
-    cone = core.explore_object(CONE, CONE.start, CONE.outward, tolerance=TOLERANCE, noise=5e-4, rng=2)
+    cone = core.explore_object(CONE, CONE.start, CONE.outward, tolerance=TOLERANCE, noise=5e-4, rng=0)
     assert cone.status == "ok"
     mesh = cone.reference.mesh
     top = mesh.vertices[mesh.vertices[:, 2].argmax()]
