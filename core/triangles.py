@@ -12,6 +12,7 @@ from .arguments import Array
 Indices = NDArray[np.integer[Any]]
 
 LEAST_DIVISOR = 1e-300  # No vector is divided by less.
+SAME = 1e-6  # Lengths that differ by a smaller share are the same, however a kernel rounds.
 
 
 def row_dot(u: Array, v: Array) -> Array:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from ..contours.contour import vector_of
 from ..contours.finger import Contact
-from ..triangles import LEAST_DIVISOR, normalized, row_dot, triangle_cross
+from ..triangles import LEAST_DIVISOR, SAME, normalized, row_dot, triangle_cross
 from .connectivity import Indices
 from .finger import Finger
 from .meshing import Mesh
@@ -35,7 +35,6 @@ ALONG = 0.5  # Ways agree if the cosine of the angle between them is more.
 NEAREST = 12  # The nearest segment is one of this many whose middles are nearest.
 # Sides of the border below this share of an edge are one place: with 1e-6 the triangle of one turns over at a
 SHORT = 0.01  # notch of an open sheet under SkylakeX (test_borders).
-SAME = 1e-6  # Lengths that differ by a smaller share are the same.
 
 PLACES_AT_ONCE = 1000  # A step feels this many places.
 
@@ -137,42 +136,41 @@ def _rim_of(mesh: Mesh) -> tuple[Indices, Indices, Indices, Array, Array]:
 def _lengths(
     off: Offsets, places: Array, ways: Array, step: float
 ) -> Generator[float, None, tuple[Array, NDArray[np.bool_]]]:
-    """Lengths (n,) of a surface along ways (n, 3) from places (n, 3), and whether it ends there, (n,)."""
-    every, low = np.arange(len(places)), np.zeros(len(places))
-    inside, ended = ~np.isnan((yield from off(places, every))), np.zeros(len(places), dtype=bool)
-    for i in range(1, round(REACH / STEP) + 1):
-        left = np.flatnonzero(~ended)
-        trial = np.where(inside[left], i * step, -i * step)
-        above = yield from off(places[left] + trial[:, None] * ways[left], left)
-        left = left[np.isnan(above) == inside[left]]
-        ended[left], low[left] = True, np.where(inside[left], i - 1, -i) * step
-        yield 0.0
+    """Lengths (n,) along ways (n, 3) from places (n, 3) to the nearest end of a surface; whether it ends."""
+    every, steps = np.arange(len(places)), step * np.arange(-REACH / STEP, REACH / STEP + 1.0)
+    trials = places[:, None] + steps[:, None] * ways[:, None]
+    above = yield from off(trials.reshape(-1, 3), every.repeat(len(steps)))
+    is_met = ~np.isnan(above).reshape(len(places), -1)
+    is_end = is_met[:, :-1] & ~is_met[:, 1:]
+    low = steps[np.where(is_end, np.abs(steps[:-1] + 0.5 * step), np.inf).argmin(axis=1)]
     high = low + step
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         met = ~np.isnan((yield from off(places + middle[:, None] * ways, every)))
         low, high = np.where(met, middle, low), np.where(met, high, middle)
-        yield 0.0
-    return low, ended
+    return low, is_end.any(axis=1)
 
 
 def _corners(places: Array, before: Indices, after: Indices, edge: float) -> tuple[Array, NDArray[np.bool_]]:
     """Where the lines of a border on both sides of its segments meet, (k, 3), and whether they do, (k,)."""
     leading, following = (np.arange(len(places)) for _ in range(2))
     leading[after], following[before] = before, after
-    a, b, first, last = places[before], places[after], leading[before], following[after]
-    u, v = normalized(a - places[leading[first]]), normalized(b - places[following[last]])
+    meet, sides = np.ones(len(before), dtype=bool), []
+    # The ends of a segment may be off the lines beside a corner, so these are taken from the next ones.
+    for end, way in ((before, leading), (after, following)):
+        start = places[way[end]]
+        along = normalized(start - places[way[way[end]]])
+        foot = start + row_dot(places[end] - start, along)[:, None] * along
+        meet &= np.linalg.norm(places[end] - foot, axis=1) < STRAIGHT * edge
+        sides += [foot, along]
+    a, u, b, v = sides
     cosine, along_u, along_v = row_dot(u, v), row_dot(b - a, u), row_dot(b - a, v)
     area = np.maximum(1.0 - cosine**2, LEAST_DIVISOR)
     s, t = (along_u - cosine * along_v) / area, (cosine * along_u - along_v) / area
-    meet = (
-        (np.abs(cosine) < TURNED) & (np.minimum(s, t) > -STRAIGHT * edge) & (np.maximum(s, t) < REACH * edge)
-    )
-    for at, way, middle in ((a, u, first), (b, v, last)):
-        off = at - places[middle]
-        meet &= np.linalg.norm(off - row_dot(off, way)[:, None] * way, axis=1) < STRAIGHT * edge
+    meet &= np.abs(cosine) < TURNED
+    meet &= (np.minimum(s, t) > -STRAIGHT * edge) & (np.maximum(s, t) < REACH * edge)
     corners = 0.5 * (a + s[:, None] * u + b + t[:, None] * v)
-    return np.where(meet[:, None], corners, a), meet
+    return np.where(meet[:, None], corners, places[before]), meet
 
 
 def snapped_to_border(mesh: Mesh, border: Border) -> Mesh:

@@ -211,9 +211,7 @@ class Charts:
 
     def widened(self, factor: float) -> "Charts":
         """Tables of these patches whose deviations are larger by a factor."""
-        wider = replace(self, stds=factor * self.stds)
-        vars(wider)["is_flat"] = self.is_flat  # where cached_property looks: it does not depend on these
-        return wider
+        return replace(self, stds=factor * self.stds)
 
     def joined(self, others: "Charts") -> "Charts":
         """The tables of these patches, followed by others."""

@@ -20,8 +20,8 @@ from .meshing import Mesh
 # python -m benchmarks.atlas --only ring and --only egg chose these.
 SAGITTA = 80.0  # A quadric is so wide that its sagitta is this many deviations of the surface.
 LEAST = 2.0  # The least radius, in edges of the mesh; the sagitta follows from a quadric twice as wide.
-# It is fitted to every other vertex, which are chosen by a seed, to the nearest 128 at most and 6 at least.
-EVERY, PLACES, FEWEST, SEED = 2, 128, 6, 0
+# It is fitted to every other vertex, in random order, to the nearest 128 at most and 6 at least.
+EVERY, PLACES, FEWEST = 2, 128, 6
 SHARP = 0.87  # Triangles on both sides of a crease are turned by 30 degrees,
 TURNED = 0.966  # Normals on both sides of a crease are turned by 15 degrees, half of what its triangles are.
 # Places are on one sheet if the cosine between their normals is more, and if the sum of both has at most the
@@ -62,7 +62,7 @@ def sheets_of(mesh: Mesh, normals: Array) -> NormalSamples:
     from scipy.spatial import cKDTree
 
     # In the order of a mesh every other vertex may be on one of two walls.
-    some = np.random.default_rng(SEED).permutation(len(normals))[::EVERY]
+    some = np.random.default_rng(0).permutation(len(normals))[::EVERY]
     ends = cKDTree(mesh.vertices[np.unique(_ends(mesh, mesh.normals))])
     return NormalSamples(cKDTree(mesh.vertices[some]), normals[some], mesh.std[some], ends, mesh.edge)
 

@@ -17,9 +17,10 @@ from ..exploration.side_by_side import exploring_many
 from ..reconstruction.result import Reconstruction
 from ..steps import result_of
 from .finger import FACING, finger_at
+from .object_atlas import NEAR
 from .rims import radial_extent
 from .samples import OPPOSITE, THIN_SHARE
-from .touching import FIRST_EXTENT, NEAR
+from .touching import FIRST_EXTENT
 
 # python -m benchmarks.add_menu --expected judges these.
 ROUNDS, AT_ONCE = 3, 4  # The rounds, and the touches of each, at places that none before covers.

@@ -19,7 +19,7 @@ from ..arguments import Array
 from ..contours.contour import Contour, Vector, cross, dot, tangent_of, vector_of
 from ..contours.finger import Contact
 from ..reconstruction.result import Reconstruction
-from ..triangles import far_apart, normalized, triangle_cross
+from ..triangles import SAME, far_apart, normalized, triangle_cross
 from .charts import AZIMUTHS, PLACES_AT_ONCE, Charts
 from .connectivity import connected_pieces
 from .field import INSIDE, covered
@@ -45,7 +45,6 @@ ALONG = 0.9  # A direction is along another if the cosine of the angle between t
 TOUCHES_APART = 2.2  # Touches that are made side by side are this many radii apart.
 
 # Kernels of linear algebra round differently, which may not choose between what is equal but for rounding.
-TIE = 1e-6  # Distances within this share of the largest count as equal.
 GAIN_DIGITS = 9  # Gains are areas in the caller's unit, and equal if this many significant digits are.
 
 
@@ -290,7 +289,7 @@ def _between(points: Array, tried: Sequence[Vector]) -> int:
         squares = -((points[:, None] - np.array(tried)) ** 2).sum(axis=2).min(axis=1)
     else:
         squares = ((points - points.mean(axis=0)) ** 2).sum(axis=1)
-    return int(np.argmax(squares <= squares.min() + TIE * np.abs(squares).max()))
+    return int(np.argmax(squares <= squares.min() + SAME * np.abs(squares).max()))
 
 
 def border_places(mesh: Mesh) -> Iterator[RimPlace]:

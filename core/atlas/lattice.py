@@ -114,22 +114,14 @@ def _cells(inside: NDArray[np.bool_]) -> Indices:
 
 def _edges_near(lattice: Lattice, low: Array, high: Array) -> Indices:
     """The edges whose ends differ, of those that meet boxes from `low` to `high`, (n, 3) each, in pitches."""
-    if not len(low):
-        return np.zeros(0, dtype=np.intp)
     first, last = np.floor(low).astype(np.intp), np.floor(high).astype(np.intp) + 1
-    base = first.min(axis=0)
-    near = np.zeros(last.max(axis=0) - base + 1, dtype=bool)
-    for step in np.ndindex(tuple((last - first).max(axis=0) + 1)):
-        near[tuple((np.minimum(first + step, last) - base).T)] = True
-    index = np.argwhere(near)
-    points = (index + base + 1) @ lattice.strides
-    inside, edges = np.zeros(near.shape, dtype=bool), []
-    inside[near] = lattice.inside(points)
-    for axis in range(3):
-        before, after = ((slice(None),) * axis + (part,) for part in (slice(None, -1), slice(1, None)))
-        crossed = near[before] & near[after] & (inside[before] != inside[after])
-        edges.append(3 * ((np.argwhere(crossed) + base + 1) @ lattice.strides) + axis)
-    return np.concatenate(edges)
+    steps = np.ndindex(tuple((last - first).max(axis=0, initial=0) + 1))
+    near = [np.unique((np.minimum(first + step, last) + 1) @ lattice.strides) for step in steps]
+    points = np.unique(np.concatenate(near))
+    inside, ends = lattice.inside(points), points[:, None] + lattice.strides
+    at = np.searchsorted(points, ends)
+    crossed = (np.append(points, -1)[at] == ends) & (np.append(inside, False)[at] != inside[:, None])
+    return (3 * points[:, None] + np.arange(3))[crossed]
 
 
 def composed(lattice: Lattice, cells: Indices) -> Lattice:

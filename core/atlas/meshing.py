@@ -86,12 +86,8 @@ class Mesh(NamedTuple):
         Also which sides (3 m,) no other triangle has, and whether each edge belongs to exactly two.
         """
         sides, keys = keyed_sides(self.triangles, len(self.vertices))
-        order = np.sort(keys)
-        first = np.flatnonzero(np.diff(order, prepend=-1))
-        counts = np.diff(first, append=len(order))
-        once = order[first[counts == 1]]
-        at = np.searchsorted(once, keys)
-        return sides, keys, np.append(once, -1)[at] == keys, bool((counts == 2).all())
+        _, edge, counts = np.unique(keys, return_inverse=True, return_counts=True)
+        return sides, keys, counts[edge] == 1, bool((counts == 2).all())
 
     @property
     def is_closed(self) -> bool:

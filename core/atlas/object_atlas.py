@@ -32,7 +32,9 @@ from .samples import indicated
 # last one.
 FINE, SHARE, FINEST = 1.0 / 160.0, 1.0 / 60.0, 4e-3
 LIMIT, ROUGH = 1.5, 0.01  # At most this share of the surface has a deviation above this many tolerances.
-OFF_STDS, OFF_TOLERANCES = 5.0, 3.0  # A contact contradicts the surface from this many of both away.
+# What is off the surface by more tolerances is of something else: a patch ends there, and a contact
+# contradicts the surface if it is off by so many deviations, too.
+NEAR, OFF_STDS = 3.0, 5.0
 THIN = 0.9  # Walls are resolved from this share of the thickness that cells are made for.
 BORDER = 2.0  # Beyond the border of the mesh it does from this many edges away.
 WITHIN_90 = 1.645  # This many deviations are a 90 % interval.
@@ -160,12 +162,7 @@ class Atlas(Judged):
     @cached_property
     def edges(self) -> list[Edge]:
         """All pairs of patches that share a boundary, each with this boundary."""
-        return result_of(edges_of(self.charts))
-
-    def bounding(self) -> Generator[float, None, None]:
-        """Finds `edges` in steps: yields the share that is done."""
-        if "edges" not in vars(self):
-            vars(self)["edges"] = yield from edges_of(self.charts)  # where cached_property looks
+        return edges_of(self.charts, self.reference.mesh)
 
     def bends(self, edge: Edge) -> tuple[Array, Array]:
         """Gaussian curvatures (2, m) of both patches along their boundary, and standard deviations (2, m).
@@ -225,7 +222,7 @@ class Atlas(Judged):
     def contradicting(self) -> NDArray[np.bool_]:
         """Which contacts of the check (n,) are farther from the surface than is explained."""
         _, stds = self._contacts
-        return self._farther(np.maximum(OFF_STDS * stds, OFF_TOLERANCES * (self.tolerance or 0.0)))
+        return self._farther(np.maximum(OFF_STDS * stds, NEAR * (self.tolerance or 0.0)))
 
     @property
     def improvable(self) -> NDArray[np.intp]:

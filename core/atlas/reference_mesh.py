@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import Vector
-from ..triangles import closest_point, normalized, row_dot, triangle_cross
+from ..triangles import SAME, closest_point, normalized, row_dot, triangle_cross
 from .charts import Charts
 from .connectivity import Indices
 from .field import Blend, sheet_facing
@@ -21,14 +21,12 @@ from .meshing import Mesh
 
 # python -m benchmarks.atlas judges these.
 NEAREST = 3  # The nearest triangle is looked for at this many of the nearest vertices.
-SAME = 1e-6  # Triangles that are nearer by a smaller share of the distance are as near.
 AHEAD = 0.95  # The normal at a foot gives the sign if the cosine of its angle to the way there is more.
 SAGITTA = 0.5  # The surface is within this share of an edge of a place on the mesh.
-FAR = 2.0  # Places that are farther away than this many cells have the sign of the indicator.
 PREPARED = ("tree", "fans", "edge", "normals", "is_open", "angles")  # Each is found once for a mesh.
+CLOSED = 0.25  # Where the indicator is farther from its level, felt area is around it: it knows the side.
 # python -m benchmarks.measured judges these: where the surface goes on unfelt,
-SHALLOW = 1.0  # the inside is known this many cells below the surface,
-CLOSED = 0.25  # and where the indicator is above its level by more: felt area is around it;
+SHALLOW = 1.0  # the inside is known this many cells below the surface, and where the indicator is CLOSED;
 REACHES = 3.0  # the outside is known this many times farther than the foot is from the border,
 ABOVE = 0.12  # and up to this share of the size,
 BEYOND = 1.0  # and the surface is known this many edges beyond the border.
@@ -141,11 +139,12 @@ class ReferenceMesh:
         ahead, away = row_dot(off, surface.normal), np.linalg.norm(off, axis=1)
         smooth = np.abs(ahead) > AHEAD * away
         side = np.where(smooth & (surface.patch >= 0), ahead, side)
+        behind = self.indicator.at(points)
         if not self.is_open.any():
-            side = np.where(away > FAR * self.indicator.cell, -self.indicator.at(points), side)
+            side = np.where(np.abs(behind) > CLOSED, -behind, side)
         std = np.where(surface.patch < 0, std, surface.std)
         if self.unfelt is not None and self.is_open.any():
-            rim, behind = self._rim.query(points)[0], self.indicator.at(points)
+            rim = self._rim.query(points)[0]
             return self._distances_near_border(away, side, ahead, rim, std, behind, ends)
         return np.copysign(away, side), np.where(ends, np.inf, std)
 

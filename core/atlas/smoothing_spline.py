@@ -55,19 +55,6 @@ class _Equations(NamedTuple):
     counts: Array
 
 
-class _Columns(NamedTuple):
-    """Columns of n values each, of which normal equations are sums with the weights of n contacts.
-
-    bands, rights : sparse, (SIDE^2 (WIDTH + 1), n) and (SIDE^2, n), what each contact brings
-    squares : (n,), sums over the columns; columns : their number
-    """
-
-    bands: Any
-    rights: Any
-    squares: Array
-    columns: int
-
-
 class _Hyperparameters(NamedTuple):
     """The size of the random derivatives, and the deviations of contacts and normals."""
 
@@ -105,33 +92,34 @@ def smoothing_spline(contacts: Array, normals: Array, weights: Array, half: floa
     knots, basis = bases(contacts[:, 0], contacts[:, 1], half)
     up = np.maximum(normals[:, 2], LEAST_COSINE)
     values = np.column_stack([contacts[:, 2], -normals[:, :2] / up[:, None]]).T
-    heights, slopes = _columns(knots, basis[:1], values[:1]), _columns(knots, basis[1:], values[1:])
     # A slope s has 1 + s^2 times the deviation.
     certainty = np.where(normals[:, 2] > LEAST_COSINE, up**4, 0.0)
+    heights = _design(knots, basis[:1]), values[0]
+    slopes = _design(knots, basis[1:]), values[1:].ravel()
     hyperparameters = _Hyperparameters(ROUGHNESS[START], noise, SLOPE_STDS[MIDDLE])
     grids = {"slope_std": SLOPE_STDS, "roughness": ROUGHNESS}
     grids["noise"] = tuple(noise * factor for factor in NOISE_FACTORS)
-    equations = _equations([heights, slopes], [weights, weights * certainty])
+    equations = _equations([heights, slopes], [weights, np.tile(weights * certainty, 2)])
     for _ in range(PASSES):
         best = _solved(equations, hyperparameters, half)
         for name, grid in grids.items():
             best = _ascended(equations, best, name, grid, half)
-        residuals = np.abs(np.einsum("nk,nk->n", basis[0], best.coefficients()[knots]) - values[0])
+        residuals = np.abs(heights[0] @ best.coefficients() - heights[1])
         weights, hyperparameters = _student(residuals, best.hyperparameters.noise), best.hyperparameters
-        equations = _equations([heights, slopes], [weights, weights * certainty])
+        equations = _equations([heights, slopes], [weights, np.tile(weights * certainty, 2)])
         if hyperparameters.noise == noise:
             break  # Outlying contacts, which make the noise look larger, did not count.
     best = _solved(equations, hyperparameters, half)
     return Spline(best.coefficients().reshape(SIDE, SIDE), _stds(best.factor))
 
 
-def _equations(columns: Sequence[_Columns], weights: Sequence[Array]) -> _Equations:
-    """The equations of heights and slopes that count by their weights (n,)."""
-    sums = [
-        (some.bands @ w, some.rights @ w, some.squares @ w, some.columns * np.count_nonzero(w))
-        for some, w in zip(columns, weights, strict=True)
-    ]
-    bands, *others = (np.array(values) for values in zip(*sums, strict=True))
+def _equations(data: Sequence[tuple[Any, Array]], weights: Sequence[Array]) -> _Equations:
+    """The equations of heights and slopes, each a design matrix and m values, with their weights (m,)."""
+    sums = []
+    for (design, values), w in zip(data, weights, strict=True):
+        weighted = design.T.multiply(w).tocsr()
+        sums.append((_band(weighted @ design), weighted @ values, w @ values**2, np.count_nonzero(w)))
+    bands, *others = (np.array(parts) for parts in zip(*sums, strict=True))
     return _Equations(np.vstack([penalty(), bands]), *others)
 
 
@@ -182,21 +170,12 @@ def _triangular(factor: Array, right: Array, trans: str) -> Array:
     return solved.reshape(right.shape)
 
 
-def _columns(knots: Any, basis: Array, values: Array) -> _Columns:
-    """What n contacts bring to the fit of bases (c, n, 16) at knots (n, 16) to values (c, n)."""
-    from scipy.sparse import csc_matrix
+def _design(knots: Any, basis: Array) -> Any:
+    """The sparse matrix (c n, SIDE^2) from coefficients to data, for bases (c, n, 16) at knots (n, 16)."""
+    from scipy.sparse import csr_array
 
-    # A contact has 16 coefficients, so 136 pairs of them are in the band of the matrix's lower half.
-    one, other = np.tril_indices(16)
-    rows = knots[:, other] * (WIDTH + 1) + knots[:, one] - knots[:, other]
-    pairs = np.einsum("cnp,cnp->np", basis[:, :, one], basis[:, :, other])
-    rights = np.einsum("cnk,cn->nk", basis, values)
-    parts = []
-    for each, at, size in ((pairs, rows, WIDTH + 1), (rights, knots, 1)):
-        starts = np.arange(0, each.size + 1, each.shape[1])
-        shape = size * SIDE**2, len(knots)
-        parts.append(csc_matrix((each.ravel(), at.ravel(), starts), shape=shape))
-    return _Columns(parts[0], parts[1], (values**2).sum(axis=0), len(basis))
+    columns, starts = np.tile(knots.ravel(), len(basis)), np.arange(0, basis.size + 1, 16)
+    return csr_array((basis.ravel(), columns, starts), (len(starts) - 1, SIDE**2))
 
 
 def _student(residuals: Array, std: float) -> Array:

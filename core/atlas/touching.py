@@ -3,7 +3,7 @@
 """Touches that grow over a whole object by themselves (paper, VI), and the surface of all of them."""
 
 import math
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -11,41 +11,38 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, number, unit_vector
-from ..contours.contour import Vector, along, cross, dot, scaled, tangent_of, vector_of
-from ..contours.finger import Contact, Surface, contact_of
+from ..contours.contour import tangent_of, vector_of
+from ..contours.finger import Contact, Surface
 from ..contours.tracking import generator_of
 from ..exploration.extent import Exploration
 from ..exploration.options import ExplorationOptions
 from ..exploration.side_by_side import exploring_many
 from ..steps import part_of, result_of
-from ..triangles import far_apart, row_dot
+from ..triangles import far_apart, normalized, row_dot
 from .borders import felt_border, snapped_to_border
 from .charts import Charts
 from .field import covered
-from .finger import FACING, finger_at
+from .finger import FACING, Finger, finger_at
 from .frontier import Frontier
 from .join import Table, refit
 from .meshing import Mesh
-from .object_atlas import LIMIT, Atlas, Check, joined_surface
+from .object_atlas import LIMIT, NEAR, Atlas, Check, joined_surface
 from .reference_mesh import ReferenceMesh
 
 # python -m benchmarks.atlas judges these.
 MOST = 1000  # There are at most this many touches, unless the caller says otherwise.
 FIRST_EXTENT = 300.0  # A half curve of the first touch is at most this many tolerances long.
 GOOD = 10.0  # The first patch is looked for near the start if its radius is below this many tolerances,
-AWAY, AROUND = (10.0, 30.0), 8  # at these many tolerances away, in this many directions.
+AWAY, EVERY = 30.0, 3  # up to this many tolerances away, at every third place of a disk.
 SMALL = 5.0  # Touches do not go on from a patch whose radius is below this many tolerances.
 NARROW = 1.0  # Where a touch was in vain before, a patch needs a radius of only this many tolerances.
 SIDE_BY_SIDE = 8  # This many touches at once are faster, and still done in a tenth of a second.
-NEAR = 3.0  # A patch ends where the surface is off it by more tolerances.
 AGAIN = 5  # Where something is missing or less certain, touches go on at most this often.
-CHECKS, CHECK_SEED = 512, 0  # This many rays from outside check the surface.
-HAIR = 0.01  # Rays begin this share of their length above the surface, which they would meet.
+CHECKS = 512  # This many rays from outside check the surface.
 SHARPEST, SPIKES = 64, 16  # This many go to its sharpest vertices, and to the triangles around the sharpest.
 # This many go to its least certain vertices. Without them, and with three rounds AGAIN, 3 of 39 runs on cones
 UNSURE = 128  # and chamfered boxes are "ok" and off by up to 4 tolerances.
 STRAIGHT = 0.5  # A ray must meet what it is aimed at if the cosine between it and the normal is more.
-JOINED = 0.5  # Joining is this share of the way to a surface that is checked.
 BORDERS = 2  # This often a mesh is moved to the borders that are felt.
 AGAIN_APART = 0.5  # Touches that improve the joined surface are this many radii apart.
 LARGER = 2.0  # A touch reaches at most this many radii of the patch from which it goes on.
@@ -101,9 +98,11 @@ def touch_all_over(
     if tolerance < noise:
         raise ValueError(f"tolerance: expected the noise {noise:g} or more, got {tolerance:g}")
     options = ExplorationOptions(noise=noise, rng=generator, largest_std=tolerance)
-    run = _Run(surface, tolerance, most, options)
-    if earlier:
-        yield from run.taking_up(earlier)
+    frame = earlier[0].result.frame if earlier else None
+    at, above = (p, up) if frame is None else (frame.origin, frame.axes[:, 2])
+    finger = finger_at(surface, vector_of(at), vector_of(above), SMALL * tolerance)
+    run = _Run(finger, tolerance, most, options)
+    yield from run.taking_up(earlier)
     if not run.found:
         yield from run.show(run.first(p, up))
     yield from _all_over(run)
@@ -128,8 +127,10 @@ def _all_over(run: "_Run") -> Generator[Progress, object, None]:
 class _Run:
     """The touches so far, and what all of them have in common."""
 
-    def __init__(self, surface: Surface, tolerance: float, most: int, options: ExplorationOptions) -> None:
-        self.surface, self.tolerance, self.most, self.options = surface, tolerance, most, options
+    def __init__(self, finger: Finger, tolerance: float, most: int, options: ExplorationOptions) -> None:
+        self.surface, self.tolerance, self.most, self.options = finger.surface, tolerance, most, options
+        least, rng = np.pi * (SMALL * tolerance) ** 2, generator_of(options.rng)
+        self.frontier = Frontier(finger, NEAR * tolerance, least, options.noise, rng)
         self.found: list[Exploration] = []
         self.done, self.is_stopped = 0, False
 
@@ -152,67 +153,31 @@ class _Run:
 
         Where the point is on a crease or in a corner, a place near it makes a better patch.
         """
-        p, n = vector_of(point), vector_of(up)
-        felt: list[tuple[Exploration, Vector, Vector]] = []
-        errors: list[ValueError] = []
-        options = replace(self.options, farthest=FIRST_EXTENT * self.tolerance)
-        for at, outward in self._places(p, n):
-            (e,) = result_of(exploring_many(self.surface, [at], [outward], options))
-            if isinstance(e, ValueError):
-                errors.append(e)
-                continue
-            felt.append((e, at, outward))
-            if e.result.radius >= GOOD * self.tolerance:
+        n, options = vector_of(up), replace(self.options, farthest=FIRST_EXTENT * self.tolerance)
+        disk = self.frontier.finger.disk(vector_of(point), n, tangent_of(n, None), AWAY * self.tolerance)
+        results: list[Exploration | ValueError] = []
+        for contacts in (disk[:1], disk[1::EVERY]):
+            points, outward = contacts.transpose(1, 0, 2)
+            results += result_of(exploring_many(self.surface, points, outward, options))
+            felt = [e for e in results if isinstance(e, Exploration)]
+            if felt and felt[0].result.radius >= GOOD * self.tolerance:
                 break
         if not felt:
-            raise errors[0]
-        first, at, outward = max(felt, key=lambda each: each[0].result.radius)
-        self.frontier = self._frontier(at, outward, first.step)
+            raise next(e for e in results if isinstance(e, ValueError))
+        first = max(felt, key=lambda e: e.result.radius)
         if not self.frontier.add(first.result):
             raise ValueError("point: expected a surface within three tolerances of the first patch, got none")
         self.found, self.done = [first], self.done + 1
         return self.now(new=[first])
 
-    def _frontier(self, at: Vector, outward: Vector, step: float) -> Frontier:
-        """A frontier without patches, for a finger on the outer side of the surface at a point."""
-        return Frontier(
-            finger_at(self.surface, at, outward, step),
-            NEAR * self.tolerance,
-            np.pi * (SMALL * self.tolerance) ** 2,
-            self.options.noise,
-            generator_of(self.options.rng),
-        )
-
     def taking_up(self, earlier: Sequence[Exploration]) -> Generator[Progress, object, None]:
         """Takes in touches that were found before, unless they are less certain than the tolerance."""
-        frame, step = earlier[0].result.frame, earlier[0].step
-        self.frontier = self._frontier(vector_of(frame.origin), vector_of(frame.axes[:, 2]), step)
         self.done = len(earlier)
         for e in earlier:
             is_sure = e.result.mean_height_std <= self.tolerance
             if is_sure and self.frontier.add(e.result, NARROW * self.tolerance, SMALL * self.tolerance):
                 self.found.append(e)
                 yield from self.show(self.now(new=[e]))
-
-    def _places(self, point: Vector, up: Vector) -> Iterator[tuple[Vector, Vector]]:
-        """The point and its outward direction, then contacts of a finger that comes down near it."""
-        yield point, up
-        e1 = tangent_of(up, None)
-        e2 = cross(up, e1)
-        for length in AWAY:
-            for turn in np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False):
-                reach = length * self.tolerance
-                way = along(scaled(e1, math.cos(turn)), e2, math.sin(turn))
-                raised, start = along(point, up, reach), along(along(point, way, reach), up, reach)
-                # In a hole or a slot the finger meets another wall on its way up and across.
-                if self.surface.ray_cast(along(point, up, HAIR * reach), up, reach) or (
-                    self.surface.ray_cast(raised, way, reach)
-                ):
-                    continue
-                hit = self.surface.ray_cast(start, scaled(up, -1.0), 3.0 * reach)
-                if hit is not None:
-                    contact, normal = contact_of(hit, 1.0)
-                    yield contact, scaled(normal, math.copysign(1.0, dot(normal, up)))
 
     def now(self, joining: float | None = None, new: Sequence[Exploration] = ()) -> Progress:
         """The Progress so far, with the new touches."""
@@ -272,27 +237,17 @@ class _Run:
         """Contacts of a finger that comes from outside all round, and places of the mesh that it misses."""
         starts, aims, facing, length = rays_at(reference)
         yield 1.0
-        ways = (aims - starts) / np.linalg.norm(aims - starts, axis=1, keepdims=True)
-        contacts, missed, at_random, met = [], [], 0, self.frontier.finger.met
-        for i, (start, way, aim) in enumerate(zip(starts, ways, aims, strict=True)):
-            contact = met(vector_of(start), vector_of(way), length)
-            if contact is not None:
-                contacts.append(contact)
-                at_random += i < CHECKS
-            elif i < len(facing) and facing[i] and not self._is_near(vector_of(aim), vector_of(way)):
-                missed.append(aim)
-        points, normals = np.array(contacts).reshape(-1, 2, 3).transpose(1, 0, 2)
-        return Check(points, normals, np.array(missed).reshape(-1, 3), at_random)
-
-    def _is_near(self, aim: Vector, way: Vector) -> bool:
-        """Whether the finger meets something near a place if it comes a tolerance aside of the way there."""
-        across = tangent_of(way, None)
-        near, start = self.frontier.near, along(aim, way, -self.frontier.near)
-        for aside in (across, cross(way, across)):
-            for length in (-self.tolerance, self.tolerance):
-                if self.frontier.finger.met(along(start, aside, length), way, 2.0 * near) is not None:
-                    return True
-        return False
+        finger, ways = self.frontier.finger, normalized(aims - starts)
+        met = [finger.met(vector_of(p), vector_of(way), length) for p, way in zip(starts, ways, strict=True)]
+        contacts = np.array([contact for contact in met if contact is not None]).reshape(-1, 2, 3)
+        has_met = np.array([contact is not None for contact in met])
+        missed = []
+        for i in np.flatnonzero(~has_met[: len(facing)] & facing):
+            aim, back = vector_of(aims[i]), vector_of(-ways[i])
+            # Near a rim, or where a ray slips between two faces of a mesh, something is near.
+            if len(finger.disk(aim, back, tangent_of(back, None), self.frontier.near)) == 1:
+                missed.append(i)
+        return Check(contacts[:, 0], contacts[:, 1], aims[missed], int(has_met[:CHECKS].sum()))
 
     def atlas(
         self, earlier: dict[int, tuple[int, Table]]
@@ -302,9 +257,9 @@ class _Run:
         These are where the joined surface ends though the object goes on, where a finger from outside meets
         something else, and where the surface is less certain than the tolerance.
         """
-        charts = yield from part_of(self.joining(earlier), 0.0, JOINED)
+        charts = yield from part_of(self.joining(earlier), 0.0, 0.5)
         patches = tuple(e.result for e in self.found)
-        reference = yield from part_of(joined_surface(patches, charts, self.tolerance, self.off), JOINED, 1.0)
+        reference = yield from part_of(joined_surface(patches, charts, self.tolerance, self.off), 0.5, 1.0)
         yield 1.0
         assert reference.unfelt is not None
         unfelt = yield from self.frontier.unfelt(reference.unfelt)
@@ -356,12 +311,12 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
     """Rays that check a mesh from outside all round: their starts, and places that they go to, (k, 3).
 
     Also whether each of the first CHECKS / 2 must meet something there, (CHECKS / 2,), see STRAIGHT, and the
-    length of all, which ends beyond the mesh. The first CHECKS are random: one half goes to middles of
-    triangles, the other to any place near the mesh. Others go to the SHARPEST vertices, whose triangles have
-    the least sum of angles there, to the UNSURE ones of the largest deviation, and straight down to triangles
-    around SPIKES of the sharpest.
+    length of all, which ends beyond the mesh. The first CHECKS are random: one half goes to
+    middles of triangles, the other to any place near the mesh. Others go to the SHARPEST vertices, whose
+    triangles have the least sum of angles there, to the UNSURE ones of the largest deviation, and straight
+    down to triangles around SPIKES of the sharpest.
     """
-    rng, mesh = np.random.default_rng(CHECK_SEED), reference.mesh
+    rng, mesh = np.random.default_rng(0), reference.mesh
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     middle, far = 0.5 * (low + high), float(np.linalg.norm(high - low))
     away = rng.normal(size=(CHECKS, 3))

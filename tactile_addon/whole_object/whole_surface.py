@@ -46,7 +46,6 @@ class WholeSurface:
             parts.append(self.atlas.curvatures_at(points[some], normals[some]))
             yield 0.8
         self.curvatures = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-        yield from part_of(self.atlas.bounding(), 0.8, 0.9)
         for r in self.atlas.patches:
             self._in_doubt += r.status != "ok"  # The first time this takes a while.
             yield 0.9

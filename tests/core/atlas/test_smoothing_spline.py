@@ -126,8 +126,8 @@ def test_likelihoods_are_those_of_dense_matrices():
     rng = np.random.default_rng(5)
     contacts, _ = touched(lambda x, y: (0.02 * np.sin(5.0 * x) * y, 0.0 * x, 0.0 * x), rng, 60, 1e-3)
     knots, basis = bases(contacts[:, 0], contacts[:, 1], HALF)
-    columns = splines._columns(knots, basis[:1], contacts[None, :, 2])
-    data = splines._equations([columns, columns], [np.ones(60), np.zeros(60)])
+    heights = splines._design(knots, basis[:1]), contacts[:, 2]
+    data = splines._equations([heights, heights], [np.ones(60), np.zeros(60)])
     given = [(0.3, 1e-3), (1.0, 1e-3), (0.3, 2e-3), (3.0, 2e-3)]
     ours = [
         splines._solved(data, splines._Hyperparameters(*sizes, 0.1), HALF).neg2_log_evidence

@@ -11,6 +11,7 @@ import pytest
 
 import core
 from core.atlas.boundaries import gaussian_curvature_of
+from core.atlas.finger import Finger
 from core.atlas.object_atlas import Check
 from core.atlas.touching import SIDE_BY_SIDE, _Run
 from core.exploration.options import ExplorationOptions
@@ -405,17 +406,6 @@ def test_the_graph_as_data_survives_json_and_is_that_of_the_atlas(ball, most):
         assert (d["uncovered"], d["next_touch"]) == ([], None)
 
 
-def test_edges_in_steps_are_the_edges(ring):
-    again = replace(ring)
-    shares = list(again.bounding())
-    assert shares == sorted(shares)
-    assert len(shares) >= len(ring.patches)
-    assert shares[-1] == 1.0
-    assert "edges" in vars(again)
-    assert [e.nodes for e in again.edges] == [e.nodes for e in ring.edges]
-    assert list(again.bounding()) == []
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("when", ["joining", "again"])
 def test_false_while_patches_are_joined_ends_the_touching(when):
@@ -458,7 +448,7 @@ def test_false_while_a_check_is_followed_up_ends_the_touching_soon():
 def test_one_touch_improves_places_that_are_near_each_other():
     """Many rays of the check meet the corners of one facet, from which the patches are a little off."""
     ball, angles = solids.ball(), np.linspace(0.0, 0.3, 20)
-    run = _Run(ball, 8e-3, 100, ExplorationOptions(largest_std=8e-3))
+    run = _Run(Finger(ball, 1.0), 8e-3, 100, ExplorationOptions(largest_std=8e-3))
     (first,) = run.first(np.array(ball.start), np.array(ball.outward)).found
     arc = np.stack([np.sin(angles), 0.0 * angles, np.cos(angles)], axis=1)
     list(run.going_on([(point, point) for point in np.concatenate([arc, -arc])], first.result.radius))
