@@ -311,10 +311,10 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
     """Rays that check a mesh from outside all round: their starts, and places that they go to, (k, 3).
 
     Also whether each of the first CHECKS / 2 must meet something there, (CHECKS / 2,), see STRAIGHT, and the
-    length of all, which ends beyond the mesh. The first CHECKS are random: one half goes to
-    middles of triangles, the other to any place near the mesh. Others go to the SHARPEST vertices, whose
-    triangles have the least sum of angles there, to the UNSURE ones of the largest deviation, and straight
-    down to triangles around SPIKES of the sharpest.
+    length of all, which ends beyond the mesh. The first CHECKS are random: one half goes to middles of
+    triangles, the other to any place near the mesh. Others go to the SHARPEST vertices, whose triangles have
+    the least sum of angles there, to the UNSURE ones of the largest deviation, and straight down to triangles
+    around SPIKES of the sharpest.
     """
     rng, mesh = np.random.default_rng(0), reference.mesh
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
