@@ -432,13 +432,15 @@ class _Cloud(NamedTuple):
         """Whether a patch explains some of the contacts, to which it was fitted, within their noise.
 
         What noise hides at each contact, such as a low step, the mean of neighbors shows. Contacts that are
-        too far off do not count in it: otherwise a single one hides the step.
+        too far off do not count in it, for otherwise a single one hides the step; nor do their neighbors,
+        for such a contact pulls the patch.
         """
         links, off = self.graph[some][:, some], self.distances(r, some)
         far = too_far(off, self.noise)
-        near = np.where(far, 0.0, off)
+        next_is_far = links @ far
+        near = np.where(far | next_is_far, 0.0, off)
         sums, counts = near + links @ near, 1 + links.sum(axis=1)
-        return are_few(far, links @ far) and not too_far(sums, self.noise * np.sqrt(counts)).any()
+        return are_few(far, next_is_far) and not too_far(sums, self.noise * np.sqrt(counts)).any()
 
     def distances(self, r: Reconstruction, some: Indices) -> Array:
         """Distances (n,) of some of the contacts from a patch, measured from its tangent planes."""
