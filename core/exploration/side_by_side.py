@@ -160,8 +160,9 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
             yield
         answers = {}
         for method, options in methods.items():
-            which = [i for i, request in requests.items() if request[1] == method]
-            touches = [TouchContacts(requests[i][0], *no_strokes) for i in which]
+            contours = {i: some for i, (some, wanted) in requests.items() if wanted == method}
+            which = list(contours)
+            touches = [TouchContacts(some, *no_strokes) for some in contours.values()]
             if which:
                 results = fitted(points[which], touches, outward[which], options)
                 answers.update(zip(which, results, strict=True))
