@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whole objects of the YCB Object and Model Set: how near the touched surface is, beside two peers.
+"""Whole objects of the YCB Object and Model Set: how near the touched surface is, compared with two peers.
 
 `python -m benchmarks.field FOLDER [--only NAME] [--tolerance T]`, from the root of a checkout. FOLDER has
 meshes of YCB as .ply files (google_16k/nontextured.ply of each object, renamed); one peer needs pymeshlab.
@@ -12,8 +12,8 @@ Objects are scaled to size 1, and contacts have a noise of .0005. The Markdown t
 
 The peers take the same contacts with the same exact normals: screened Poisson reconstruction, and a Gaussian
 process implicit surface with a Matern covariance of order 3/2. Each is at the setting with the best IoU,
-which its user would not know. The process takes a thousand of them, and makes no mesh: its distance is that
-from the object alone.
+which its user would not know. The process takes a thousand of them, and makes no mesh: its distance is
+only that from the object to it.
 """
 
 import sys

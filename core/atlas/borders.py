@@ -156,7 +156,7 @@ def _corners(places: Array, before: Indices, after: Indices, edge: float) -> tup
     leading, following = (np.arange(len(places)) for _ in range(2))
     leading[after], following[before] = before, after
     meet, sides = np.ones(len(before), dtype=bool), []
-    # The ends of a segment may be off the lines beside a corner, so these are taken from the next ones.
+    # The ends of a segment may be off the lines that meet at a corner, so these are taken from the next ones.
     for end, way in ((before, leading), (after, following)):
         start = places[way[end]]
         along = normalized(start - places[way[way[end]]])
