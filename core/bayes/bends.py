@@ -30,7 +30,7 @@ STEPS_AROUND = 9
 FOLD_BEND = 3.0  # A fold by an angle a bends a patch by up to 3 a / L, if it is next to the point.
 MOST_CHORDS = 24  # A curve without normals has at most this number of chords, as a touch has steps.
 SHORT_STEP = 0.1  # Steps count as this share of the mean at least: contacts in one place are no fold.
-# Measured angles have at least this error, because no surface bends evenly. Without it intervals of curvatures
+# Measured angles have at least this error, because no surface bends evenly. Without it intervals of curvature
 # hold in 98 to 100 % on exact surfaces, with 0.01 on scans (benchmarks.curvatures).
 ANGLE_MISFIT = 4.5e-3
 ROUNDED_TURN = 1e-6  # A curve whose normals turn by less, in radians, turns by rounding.
@@ -51,9 +51,10 @@ class Bends(NamedTuple):
     folded: float
 
     def with_few(self, covariance: Array) -> Array:
-        """The covariance (3, 3) of the coefficients of x^2, xy and y^2 of a fit, and what few bends add to it.
+        """The covariance (3, 3) of a fit's coefficients of x^2, xy and y^2, and what few bends add to it.
 
-        Along each curve, the curvature is as uncertain as few bends leave it, unless the fit leaves it more so.
+        Along each curve, the curvature is as uncertain as few bends leave it, or as the fit does if that is
+        more.
         """
         second = self.second
         left = np.maximum(self.stds**2 - np.einsum("ic,ij,jc->c", second, covariance, second), 0.0)

@@ -37,8 +37,8 @@ from ..verdict import SIGNIFICANT, Doubt, Judged, beyond
 from . import status
 from .status import Taps
 
-# This share of what surfaces are off polynomials is left at the point (benchmarks.real, and curvatures: with 0.6
-# intervals of k1 hold in 83 % on exact surfaces).
+# This share of what surfaces are off polynomials is left at the point (benchmarks.real, and curvatures: with
+# 0.6 intervals of k1 hold in 83 % on exact surfaces).
 NEAR_POINT = 0.63
 # The mesh is off the patch by at most this share of mean_height_std (benchmarks.patch_mesh, e20b52a).
 MESH_SHARE = 0.6
@@ -232,8 +232,8 @@ class Reconstruction(Judged):
     def _noise_share(self) -> float:
         """The share of the fit's noise that counts for curvatures at the point, where there is no process.
 
-        The noise has room for MISFIT, by which a surface is off its polynomial, and most so toward the rim. At
-        the point NEAR_POINT of it is left, or as much as contacts are off the polynomial, or their own noise.
+        The noise has room for MISFIT, by which a surface is off its polynomial, most of all toward the rim. At
+        the point NEAR_POINT of it is left, or as much as contacts are off, or as their own noise is.
         """
         if self.posterior.amplitude:
             return 1.0
