@@ -232,8 +232,8 @@ class Reconstruction(Judged):
     def _noise_share(self) -> float:
         """The share of the fit's noise that counts for curvatures at the point, where there is no process.
 
-        The noise has room for MISFIT, by which a surface is off its polynomial, most of all toward the rim. At
-        the point NEAR_POINT of it is left, or as much as contacts are off, or as their own noise is.
+        The noise has room for MISFIT, by which a surface is off its polynomial, mostly toward the rim. At the
+        point NEAR_POINT of it is left, or as much as contacts are off, or as their own noise is.
         """
         if self.posterior.amplitude:
             return 1.0
