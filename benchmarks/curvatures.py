@@ -35,7 +35,7 @@ from tests import surfaces
 from . import SCANS_FOLDER, accuracy, machine, parser_of, table
 from .accuracy import EXACT_PLANES, PLANES, STEPS, SURFACES, above, darboux, sampling
 
-TOUCHES, ON_SCANS, HOLD_OUT = 200, 600, 90
+TOUCHES, ON_SCANS, HOLD_OUT = 1000, 600, 90
 WITHIN, FAR, LARGE = 1.645, 5.0, 0.03  # The 90 % interval, and far off: in deviations and in 1 / L.
 BALL = surfaces.sphere(25.0), 12.0
 NOISE = 0.02  # mm, of found points; the errors of given ones along the normal and sideways:

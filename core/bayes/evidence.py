@@ -117,8 +117,9 @@ def process_hyperparameters(
     p = likelihoods(neg2_logs.reshape(1, len(kernels), -1), POWER).reshape(neg2_logs.shape)
     noise = np.sqrt(p.sum(axis=(0, 1)) @ noises**2)
     gram, count = (rows @ rows.T)[None], np.array([rows.shape[1]])
+    # With the largest noise alone for polynomials, a process would explain white noise that is below it.
     # What is added there to -2 log likelihood is taken off again.
-    without = neg2_log_evidence(gram, count, 0.0 * gram, SEXTIC_VARIANCES, np.array([[most]])) - 1.0
+    without = neg2_log_evidence(gram, count, 0.0 * gram, SEXTIC_VARIANCES, noises[None]) - 1.0
     best = min(neg2_logs.min(), without.min())
     use_gp = np.exp(0.5 * (best - neg2_logs)).mean() > ODDS * np.exp(0.5 * (best - without)).mean()
     return Hyperparameters(prior, noise, p.sum(axis=2) @ AMPLITUDES**2), bool(use_gp)

@@ -154,9 +154,22 @@ def test_a_single_fold_is_one_bend_whatever_length_and_side_normals_have(scale):
     turned = contour(angles, np.full(24, 0.1))
     turned = replace(turned, normals=scale * turned.normals)
     assert found.folded == pytest.approx(0.1)  # 0.2 radians over 2 L
-    assert bends([turned]).covariance == pytest.approx(found.covariance)
+    covariance = found.with_few(np.zeros((3, 3)))
+    assert bends([turned]).with_few(np.zeros((3, 3))) == pytest.approx(covariance)
     wanted = (3.5 / 3.0) ** 3 * 0.1
-    assert 2.0 * math.sqrt(found.covariance[0, 0]) == pytest.approx(wanted, rel=1e-6)
+    assert 2.0 * math.sqrt(covariance[0, 0]) == pytest.approx(wanted, rel=1e-6)
+
+
+def test_few_bends_add_only_what_the_fit_does_not_leave_open():
+    angles = np.where(np.arange(25) < 12, 0.0, 0.2)
+    found = bends([contour(angles, np.full(24, 0.1))])
+    few = found.with_few(np.zeros((3, 3)))
+    for share in (0.3, 0.9):
+        assert found.with_few(share * few) == pytest.approx(few, rel=1e-6, abs=1e-12)
+    for share in (1.0, 2.0):
+        assert found.with_few(share * few) == pytest.approx(share * few, rel=1e-6, abs=1e-12)
+    across = np.diag([0.0, 1.0, 0.0])  # The fit leaves nothing else open along both curves.
+    assert found.with_few(across) == pytest.approx(few + across, rel=1e-6, abs=1e-12)
 
 
 @pytest.mark.parametrize("wide", [1, 2, 3])
@@ -167,8 +180,10 @@ def test_a_fold_of_a_curve_makes_uncertain_what_the_patch_bends_more_than_the_re
     found = bends([contour(angles, np.diff(x))], k=-1.3)
     assert found.stds == pytest.approx([(3.5 / 3.0) ** 3 * 0.3] * 2, rel=1e-6)
     assert found.folded == pytest.approx(0.1)
-    slight = bends([contour(x / 1.2 + 1e-3 * (x > 0.35), np.diff(x))], k=-1.3)
-    assert slight.stds == pytest.approx([(3.5 / 3.0) ** 3 * 3e-3] * 2, rel=1e-6)  # 3 a / L
+    slight = bends([contour(x / 1.2 + 0.035 * (x > 0.35), np.diff(x))], k=-1.3)
+    assert slight.stds == pytest.approx([(3.5 / 3.0) ** 3 * 0.105] * 2, rel=1e-6)  # 3 a / L
+    even = bends([contour(x / 1.2 + 0.03 * (x > 0.35), np.diff(x))], k=-1.3)
+    assert even.stds == pytest.approx([0.0] * 2, abs=1e-9)  # No surface bends as evenly as that.
 
 
 @pytest.mark.parametrize("has_normals", [True, False])

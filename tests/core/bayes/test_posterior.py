@@ -406,6 +406,21 @@ def test_deviations_of_curvatures_are_those_of_surfaces_drawn_from_the_posterior
         assert found == pytest.approx(np.std(values), rel=0.01)
 
 
+@pytest.mark.parametrize(
+    ("noise", "given", "share"), [(0.0, None, 0.65), (0.0156, None, 0.8), (0.0, 0.0156, 0.8), (0.1, 0.1, 1.0)]
+)
+def test_of_the_misfit_the_curvatures_feel_what_contacts_show_or_what_is_left_at_the_point(
+    noise, given, share
+):
+    """In unit radius these noises are 0.0016 and 0.01, and that of a fit is 0.002 or more."""
+    s, found = surfaces.sphere(25), []
+    for seed in range(20):
+        contours = s.track(THREE, extent=10.0, step=0.25, noise=noise, rng=seed)
+        r = s.fit([replace(contour, normals=None, noise=given) for contour in contours])
+        found.append(r.k1_std * r.radius / (2.0 * np.sqrt(r.posterior.covariance[2, 2])))
+    assert np.mean(found) == pytest.approx(share, rel=0.04)
+
+
 def prior_mean(k1, k2):
     """The prior means of the coefficients of one surface."""
     return prior.prior_mean(np.array([k1]), np.array([k2]))[0]

@@ -38,7 +38,7 @@ def judged(r):
 @pytest.mark.parametrize("count", [15, 41, 101, 400])
 def test_intervals_hold_around_a_point_that_was_found(count, noise):
     found = []
-    for seed in range(20):
+    for seed in range(60):
         contours, normal = contours_of(count, seed, noise)
         point, _ = core.common_point(contours)
         found.append(judged(core.reconstruct(point, contours, outward=normal)))
