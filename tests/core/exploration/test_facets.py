@@ -271,6 +271,18 @@ def test_facets_that_are_long_across_a_smooth_bend_are_felt(ball):
     assert wrong <= 1
 
 
+@pytest.mark.parametrize(("face", "share"), [(67, 0.46), (110, 0.59), (112, 0.56), (42, 0.32)])
+def test_a_touch_in_doubt_beside_an_edge_is_not_one_within_a_facet(face, share):
+    """Half curves within it would have a flat patch, or that of the edge, bent the more the shorter it is."""
+    ball = hull(60)
+    a, b, _ = ball.corners[face]
+    at_edge = a + share * (b - a)
+    point = at_edge + 0.02 * (ball.corners[face].mean(axis=0) - at_edge)
+    r = core.explore(ball, tuple(point), tuple(ball.normals[face])).result
+    assert r.status == "uncertain"
+    assert r.radius > r.facet_width > 0.1
+
+
 class Bump:
     """The height -x^2 - y^2 at the corners of a grid of squares, and that of its rim beyond a radius."""
 
