@@ -96,8 +96,7 @@ class Touch:
             explored = yield from self._longest_sure()
             if method != "bayes":
                 r = yield from _fitted(explored.contours, method)
-                shape = explored.result.shape_curvatures
-                explored = replace(explored, result=r.judged_with(shape_curvatures=shape))
+                explored = replace(explored, result=r.with_facets_of(explored.result))
         else:
             explored = yield from self._felt(options.extent / CONTACTS, CONTACTS, method)
         explored = self._with_taps(explored)
@@ -160,8 +159,8 @@ class Touch:
             )
         # The shortest half curves lie in the fewest facets, which give curvatures that the shape may have.
         shortest = min(tried, key=lambda e: e.extent).result
-        shape = with_facets(shortest, self.surface).shape_curvatures
-        judged = [replace(e, result=e.result.judged_with(shape_curvatures=shape)) for e in tried]
+        shape = with_facets(shortest, self.surface)
+        judged = [replace(e, result=e.result.with_facets_of(shape)) for e in tried]
         return min(judged, key=lambda e: (e.result.status != OK, max(e.result.k1_std, e.result.k2_std)))
 
     def _roughness(self, contours: list[Contour]) -> float:

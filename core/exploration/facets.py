@@ -59,15 +59,17 @@ def with_facets(r: Reconstruction, surface: object) -> Reconstruction:
     It is the same on a surface without faces, and on a fine one, whose facets are narrow compared with the
     radius. A facet whose edges are all sharp or those of fillets, as that of a cube, is the shape itself.
     """
-    shape = _shape_curvatures(r, surface) if isinstance(surface, FacetedSurface) else None
-    return r.judged_with(shape_curvatures=read_only(np.array(shape))) if shape else r
-
-
-def _shape_curvatures(r: Reconstruction, mesh: FacetedSurface) -> list[Array]:
-    """The principal curvatures (2,) of the shape, in order, by how facets turn and by their corners."""
-    width = _smooth_width(r.frame.origin, mesh)
+    if not isinstance(surface, FacetedSurface):
+        return r
+    width = _smooth_width(r.frame.origin, surface)
     if width < max(MIN_WIDTH_RATIO * r.radius, SMALLEST):
-        return []
+        return r
+    shape = read_only(np.array(_shape_curvatures(r, surface, width)))
+    return r.judged_with(shape_curvatures=shape, facet_width=width)
+
+
+def _shape_curvatures(r: Reconstruction, mesh: FacetedSurface, width: float) -> list[Array]:
+    """The principal curvatures (2,) of the shape, in order, by how facets turn and by their corners."""
     facet, (points, *corners) = cache(lambda face: _facet(mesh, face)), _around(r, mesh, width)
     by_turning = _turning(r, points, [facet(face) for face in map(mesh.face_near, points.tolist())])
     faces_within = [set(map(mesh.face_near, near.tolist())) for near in corners]

@@ -60,6 +60,7 @@ class Reconstruction(Judged):
     taps : what taps between the curves have met; None without taps
     shape_curvatures : (n, 2), estimates of the principal curvatures, in order, of the shape that few facets
         stand for; none where the mesh is fine or unknown
+    facet_width : the width of the facet at the point across its bends, a length; 0 without estimates
     known_curves : the contours as Curves of one touch, in the world, if they were computed before
 
     All else is computed from these when it is first used, so contours and strokes are copies that cannot be
@@ -77,6 +78,7 @@ class Reconstruction(Judged):
     strokes: Array = field(default_factory=lambda: np.empty((0, 3)))
     taps: Taps | None = None
     shape_curvatures: Array = field(default_factory=lambda: np.empty((0, 2)))
+    facet_width: float = 0.0
     known_curves: Curves | None = None
 
     def __post_init__(self) -> None:
@@ -265,9 +267,16 @@ class Reconstruction(Judged):
 
     @property
     def _facet_std(self) -> float:
-        """How far they may be off: as far as the farthest estimate is, and as estimates are apart."""
+        """How far they may be off: as far as the farthest estimate is, and as estimates are apart.
+
+        Facets of width w show how far the shape turns from one to the next, but not where within w. So what
+        is open of the curvature, s, is a turn by s w. Half curves of length L < w may have all of it: the
+        parabola of least squares over a kink at its point has 15/16 of the kink's turn over L. So s is
+        larger by w / L.
+        """
         apart = np.ptp(self.shape_curvatures, axis=0).max() if self._off_shape else 0.0
-        return math.hypot(max(self._off_shape, default=0.0), apart)
+        off = math.hypot(max(self._off_shape, default=0.0), apart)
+        return off * max(self.facet_width / self.radius, 1.0)
 
     @cached_property
     def bends(self) -> Bends:
@@ -373,17 +382,23 @@ class Reconstruction(Judged):
             strokes=end + scale * (self.strokes - start) @ turn.T,
             point=end,
             shape_curvatures=self.shape_curvatures / scale,
+            facet_width=scale * self.facet_width,
             known_curves=None,
         )
 
     def judged_with(self, **values: object) -> "Reconstruction":
-        """This fit with other values that only its verdict depends on: `taps`, `shape_curvatures`.
+        """This fit with other values that only its verdict depends on: `taps`, `shape_curvatures` and
+        `facet_width`.
 
         What follows from the fit alone is kept; `mean_height_std` may be given if it is known.
         """
         other, of_these = object.__new__(Reconstruction), ("gravest", "doubts", "curvature_covariance")
         set_fields(other, **{key: value for key, value in vars(self).items() if key not in of_these} | values)
         return other
+
+    def with_facets_of(self, other: "Reconstruction") -> "Reconstruction":
+        """This fit with what the facets at another one show of the shape."""
+        return self.judged_with(shape_curvatures=other.shape_curvatures, facet_width=other.facet_width)
 
     @property
     def message(self) -> str:

@@ -59,6 +59,7 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
         "posterior": posterior and _posterior_dict(posterior),
         "taps": None if r.taps is None else r.taps._asdict(),
         "shape_curvatures": r.shape_curvatures.tolist() if len(r.shape_curvatures) else None,
+        "facet_width": r.facet_width,
     }
 
 
@@ -104,6 +105,7 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
         shape_curvatures=(
             np.empty((0, 2)) if shape is None else finite_array("shape_curvatures", shape, (None, 2), LARGEST)
         ),
+        facet_width=number("facet_width", _value(d, "facet_width"), least=0.0),
     )
     _require_contacts(r)
     return r.judged_with(mean_height_std=number("mean_height_std", _value(d, "mean_height_std"), least=0.0))

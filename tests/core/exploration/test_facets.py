@@ -271,6 +271,18 @@ def test_facets_that_are_long_across_a_smooth_bend_are_felt(ball):
     assert wrong <= 1
 
 
+@pytest.mark.parametrize(("face", "share"), [(67, 0.46), (110, 0.59), (112, 0.56), (42, 0.32)])
+def test_a_touch_in_doubt_beside_an_edge_is_not_one_within_a_facet(face, share):
+    """Half curves within it would have a flat patch, or that of the edge, bent the more the shorter it is."""
+    ball = hull(60)
+    a, b, _ = ball.corners[face]
+    at_edge = a + share * (b - a)
+    point = at_edge + 0.02 * (ball.corners[face].mean(axis=0) - at_edge)
+    r = core.explore(ball, tuple(point), tuple(ball.normals[face])).result
+    assert r.status == "uncertain"
+    assert r.radius > r.facet_width > 0.1
+
+
 class Bump:
     """The height -x^2 - y^2 at the corners of a grid of squares, and that of its rim beyond a radius."""
 
@@ -307,6 +319,31 @@ def test_the_deviation_has_how_far_estimates_of_the_shape_are_off_and_apart(radi
     off = np.abs(r.k1 - found.shape_curvatures).max()
     apart = np.ptp(found.shape_curvatures, axis=0).max()
     assert found.k1_std == pytest.approx(math.hypot(r.k1_std, off, apart), rel=0.01)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.99, 1.01, 2.0, 5.0])
+def test_facets_wider_than_half_curves_leave_more_of_the_curvature_open(share):
+    """They show how far the shape turns from one to the next, and half curves may have all of that turn."""
+    exact = core.explore(plane(), (0.0, 0.0, 0.0), UP, extent=0.2).result
+    r = replace(exact, shape_curvatures=np.array([[-1.0, 0.0]]))
+    wide = replace(r, facet_width=share * r.radius)
+    expected, turn = max(share, 1.0) * abs(exact.k1 + 1.0), np.diag([2.0, 2.0, 2.0, 1.0])
+    assert wide.k1_std == pytest.approx(math.hypot(exact.k1_std, expected))
+    assert wide.moved(turn).k1_std == pytest.approx(0.5 * wide.k1_std)
+    assert wide.doubts == r.doubts
+
+
+@pytest.mark.parametrize("radius", [0.03, 0.05, 0.1])
+@pytest.mark.parametrize(("extent", "is_new"), [(0.05, True), (0.07, True), (0.19, False)])
+def test_the_curvature_of_a_ridge_within_a_facet_is_within_its_deviation(radius, extent, is_new):
+    """The shorter a parabola on the ridge is, the more of the curvature at its top it has."""
+    x = 0.2 * (np.arange(-6, 6) + 0.5)
+    prism = Prism(np.column_stack([x, -0.3 * np.hypot(x, radius)]))
+    r, _ = touched(prism, extent, 0.0)
+    over = np.linspace(-r.radius, r.radius, 1001)
+    off = abs(r.k1 - 2.0 * np.polyfit(over, -0.3 * np.hypot(over, radius), 2)[0])
+    assert off < 2.0 * r.k1_std
+    assert (off > 2.0 * replace(r, facet_width=0.0).k1_std) == is_new
 
 
 def test_curvatures_of_flattened_balls_are_seldom_wrongly_said_to_be_those_of_facets():

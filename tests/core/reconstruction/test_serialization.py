@@ -28,7 +28,7 @@ def touched(noise=0.05, **options):
 
 RESULTS = [touched(method=method) for method in METHODS]
 RESULTS += [touched(degree=2), touched(degree=6), touched(noise=1.0), touched(degree="auto")]
-RESULTS += [replace(RESULTS[0], shape_curvatures=np.array([[-0.5, 0.1], [-0.4, 0.2]]))]
+RESULTS += [replace(RESULTS[0], shape_curvatures=np.array([[-0.5, 0.1], [-0.4, 0.2]]), facet_width=30.0)]
 
 
 @pytest.mark.parametrize("r", RESULTS)
@@ -44,7 +44,7 @@ def test_through_json_and_back_it_is_the_same_to_the_last_bit(r):
     for one, other in zip(again.contours, r.contours, strict=True):
         for key, value in vars(one).items():
             assert np.array_equal(value, vars(other)[key]), key
-    for name in ("method", "status", "message", "radius", "converged", "mean_height_std"):
+    for name in ("method", "status", "message", "radius", "converged", "mean_height_std", "k1_std"):
         assert getattr(again, name) == getattr(r, name)
     for name in ("null_space_dimension", "fit_error", "total_absolute_curvature", "condition_number"):
         assert getattr(again, name) == getattr(r, name)
