@@ -105,11 +105,11 @@ def main():
     import bpy
 
     addon, core, clock = extension.tactile_addon, extension.core, Clock()
-    side_by_side, tracking = core.exploration.side_by_side, core.contours.tracking
+    touches, tracking = core.exploration.touches, core.contours.tracking
     clock.wrap(addon.touch.surface.MeshSurface, "ray_cast", "ray casts")
     for name in ("first_contact", "_extended"):
         clock.wrap(tracking, name, "tracking")
-    clock.wrap(side_by_side, "fitted", "fit")
+    clock.wrap(touches, "fitted", "fit")
     clock.wrap(addon.touch.touch_object, "reconstruction_report", "fit")
     clock.wrap(addon.scene.patch_object, "rewrite", "mesh write")
     update = as_in_a_window(addon)

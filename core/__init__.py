@@ -33,9 +33,8 @@ from .contours.tracking import track
 from .exploration.extent import Exploration
 from .exploration.facets import is_beside_bend, with_facets
 from .exploration.options import ExplorationOptions
-from .exploration.side_by_side import exploring_many
 from .exploration.taps import MeshError, doubts_by_mesh, mesh_error
-from .exploration.touches import explore, explore_many
+from .exploration.touches import explore, explore_many, exploring_many
 from .paper.by_method import SOLVERS
 from .patch.domain import Domain
 from .patch.geometry import Geometry, distances, fit_error

@@ -13,7 +13,7 @@ from ..contours.finger import Surface
 from ..contours.tracking import generator_of
 from ..exploration.extent import Exploration
 from ..exploration.options import ExplorationOptions
-from ..exploration.side_by_side import exploring_many
+from ..exploration.touches import exploring_many
 from ..reconstruction.result import Reconstruction
 from ..steps import result_of
 from .finger import FACING, finger_at

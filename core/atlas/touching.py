@@ -16,7 +16,7 @@ from ..contours.finger import Contact, Surface
 from ..contours.tracking import generator_of
 from ..exploration.extent import Exploration
 from ..exploration.options import ExplorationOptions
-from ..exploration.side_by_side import exploring_many
+from ..exploration.touches import exploring_many
 from ..steps import part_of, result_of
 from ..triangles import far_apart, normalized, row_dot
 from .borders import felt_border, snapped_to_border

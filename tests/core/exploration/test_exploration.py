@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull
 
 import core
 from core.contours.contour import UNEXPLAINED
-from core.exploration import extent, side_by_side
+from core.exploration import extent, touches
 from core.exploration.extent import suffices
 from core.reconstruction.from_contours import fitted
 from core.reconstruction.next_plane import azimuth_of
@@ -130,7 +130,7 @@ def short_waves():
 
 def test_what_is_too_rough_for_any_fit_to_be_trusted_is_not_fitted(monkeypatch):
     fits = []
-    monkeypatch.setattr(side_by_side, "fitted", lambda *given: fits.append(1) or fitted(*given))
+    monkeypatch.setattr(touches, "fitted", lambda *given: fits.append(1) or fitted(*given))
     found, few = explore(short_waves()), len(fits)
     monkeypatch.setattr(extent, "DOUBTFUL_FIT", np.inf)
     assert explore(short_waves()).extent == found.extent
@@ -140,7 +140,7 @@ def test_what_is_too_rough_for_any_fit_to_be_trusted_is_not_fitted(monkeypatch):
 def fits_of(monkeypatch, surface, **more):
     """What is found, and the results of the fits that this took."""
     results = []
-    monkeypatch.setattr(side_by_side, "fitted", lambda *given: results.extend(r := fitted(*given)) or r)
+    monkeypatch.setattr(touches, "fitted", lambda *given: results.extend(r := fitted(*given)) or r)
     return explore(surface, **more), results
 
 
@@ -705,5 +705,5 @@ def test_a_plane_is_added_if_it_takes_a_tenth_off_the_deviation():
 def test_the_length_at_which_curves_end_is_found_to_a_64th():
     ball = surfaces.sphere(20.0)
     given = ball, tuple(ball.point), tuple(ball.normal)
-    found = side_by_side._farthest(*given, PLANES, partial(core.track, *given))
+    found = touches._farthest(*given, PLANES, partial(core.track, *given))
     assert 1.0 <= found / (20.0 * math.radians(75.0)) * 1.002 < 1.0 + 1.0 / 64.0
