@@ -30,7 +30,7 @@ STEPS_AROUND = 9
 FOLD_BEND = 3.0  # A fold by an angle a bends a patch by up to 3 a / L, if it is next to the point.
 MOST_CHORDS = 24  # A curve without normals has at most this number of chords, as a touch has steps.
 SHORT_STEP = 0.1  # Steps count as this share of the mean at least: contacts in one place are no fold.
-# Turns beyond even ones are no folds if they are less, in radians, because no surface bends evenly. Without this
+# Turns beyond even ones are no folds if they are less, in radians, for no surface bends evenly. Without this,
 # intervals of curvature hold in 98 to 100 % on exact surfaces (benchmarks.curvatures).
 LEAST_FOLD = math.radians(1.8)
 ROUNDED_TURN = 1e-6  # A curve whose normals turn by less, in radians, turns by rounding.
