@@ -120,7 +120,7 @@ PROMISES = [
     ("stability", "more than # % of the radius.", 100 * status.DOUBTFUL_FIT),
     ("stability", "from # % of the radius on it warns", 100 * status.DOUBTFUL_STD),
     ("stability", "be up to $#a/L$ off", bends.FOLD_BEND),
-    ("stability", "one of less than #° counts", round(math.degrees(7.07 * bends.ANGLE_MISFIT), 1)),
+    ("stability", "One of less than #° counts", math.degrees(bends.LEAST_FOLD)),
     ("stability", "is more than three times the stated one", of("benchmarks/stability", "TOO_FAR") / 3),
     ("stability", "the frame is off by more than #°", of("benchmarks/stability", "TURNED")),
     ("stability", "accurate to # % of the radius", 100 * of("benchmarks/stability", "SMALL")),

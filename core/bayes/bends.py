@@ -30,9 +30,9 @@ STEPS_AROUND = 9
 FOLD_BEND = 3.0  # A fold by an angle a bends a patch by up to 3 a / L, if it is next to the point.
 MOST_CHORDS = 24  # A curve without normals has at most this number of chords, as a touch has steps.
 SHORT_STEP = 0.1  # Steps count as this share of the mean at least: contacts in one place are no fold.
-# Measured angles have at least this error, because no surface bends evenly. Without it intervals of curvature
-# hold in 98 to 100 % on exact surfaces, with 0.01 on scans (benchmarks.curvatures).
-ANGLE_MISFIT = 4.5e-3
+# Turns beyond even ones are no folds if they are less, in radians, for no surface bends evenly. Without this,
+# intervals of curvature hold in 98 to 100 % on exact surfaces (benchmarks.curvatures).
+LEAST_FOLD = math.radians(1.8)
 ROUNDED_TURN = 1e-6  # A curve whose normals turn by less, in radians, turns by rounding.
 
 
@@ -122,7 +122,7 @@ def _turns(contours: Sequence[Contour], frame: Frame, radius: float, noise: floa
         # Products of the largest numbers have to be finite.
         normals = normals / max(float(np.abs(normals).max()), 1e-300) @ frame.axes
         along, angles = along[order], _angles(normals, toward[curve])
-        stds = np.array([max(contour.normal_std or 0.0, ANGLE_MISFIT) for contour in contours])[curve]
+        stds = np.array([contour.normal_std or 0.0 for contour in contours])[curve]
     else:
         curve, along, angles, stds = _chords(curve, along[order], local[order, 2], noise)
     first, second = _neighbors(curve)
@@ -222,8 +222,10 @@ def _bends(of: _Turns) -> Array:
     beyond = _unexplained(of, of.turns - around)
     turned, bends = _counted(of, around + _unexplained(of, _without_outliers(of, of.turns) - around))
     contacts = np.maximum(number / bends, 1.0) if of.is_felt else np.ones(len(bends))
-    most, few = _counted(of, beyond)
-    net = np.bincount(curve, _with_neighbors(of, of.turns - around, beyond))
+    _, few = _counted(of, beyond)
+    folds = np.where(np.abs(beyond) > LEAST_FOLD, beyond, 0.0)
+    most = np.bincount(curve, np.abs(folds))
+    net = np.bincount(curve, _with_neighbors(of, of.turns - around, folds))
     mean = np.abs(net) / np.maximum(np.bincount(curve, of.steps), SMALLEST)
     at_point = np.lexsort((np.abs(of.middles), curve))[number.cumsum() - number]
     shares = (FEW_BENDS / np.maximum(few, LEAST_BENDS)) ** 3
