@@ -229,9 +229,9 @@ class _Run:
             some = list(zip(points[few], normals[few], strict=True))
             new = yield from self.showing(self.touching(some, farthest, [NARROW] * len(some)))
             left = np.setdiff1d(left, few)
-            left = left[~covered(self.frontier.charts, points[left], normals[left], AGAIN_APART, first)]
             yield from self.show(self.now(new=new))
-        yield from _all_over(self)
+            yield from _all_over(self)
+            left = left[~covered(self.frontier.charts, points[left], normals[left], first=first)]
 
     def check(self, reference: ReferenceMesh) -> Generator[float, None, Check]:
         """Contacts of a finger that comes from outside all round, and places of the mesh that it misses."""
