@@ -35,7 +35,6 @@ FIRST_EXTENT = 300.0  # A half curve of the first touch is at most this many tol
 GOOD = 10.0  # The first patch is looked for near the start if its radius is below this many tolerances,
 AWAY, EVERY = 30.0, 3  # up to this many tolerances away, at every third place of a disk.
 SMALL = 5.0  # Touches do not go on from a patch whose radius is below this many tolerances.
-NARROW = 1.0  # A patch whose radius is at most this many tolerances is left out.
 SIDE_BY_SIDE = 8  # This many touches at once are faster, and still done in a tenth of a second.
 AGAIN = 5  # Where something is missing or less certain, touches go on at most this often.
 CHECKS = 512  # This many rays from outside check the surface.
@@ -174,7 +173,7 @@ class _Run:
         self.done = len(earlier)
         for e in earlier:
             is_sure = e.result.mean_height_std <= self.tolerance
-            if is_sure and self.frontier.add(e.result, NARROW * self.tolerance, SMALL * self.tolerance):
+            if is_sure and self.frontier.add(e.result, SMALL * self.tolerance):
                 self.found.append(e)
                 yield from self.show(self.now(new=[e]))
 
@@ -194,8 +193,11 @@ class _Run:
         new = []
         for e, point, up in zip(results, points, outward, strict=True):
             # At an edge a fit may end up on the other side.
-            is_felt = isinstance(e, Exploration) and e.result.frame.axes[:, 2] @ up >= FACING
-            if is_felt and self.frontier.add(e.result, NARROW * self.tolerance, SMALL * self.tolerance):
+            if (
+                isinstance(e, Exploration)
+                and e.result.frame.axes[:, 2] @ up >= FACING
+                and self.frontier.add(e.result, SMALL * self.tolerance)
+            ):
                 new.append(e)
                 yield
             else:
