@@ -226,9 +226,9 @@ class _Run:
             some = list(zip(points[few], normals[few], strict=True))
             new = yield from self.showing(self.touching(some, farthest))
             left = np.setdiff1d(left, few)
+            left = left[~covered(self.frontier.charts, points[left], normals[left], AGAIN_APART, first)]
             yield from self.show(self.now(new=new))
-            yield from _all_over(self)
-            left = left[~covered(self.frontier.charts, points[left], normals[left], first=first)]
+        yield from _all_over(self)
 
     def check(self, reference: ReferenceMesh) -> Generator[float, None, Check]:
         """Contacts of a finger that comes from outside all round, and places of the mesh that it misses."""
