@@ -61,6 +61,10 @@ class Finger(NamedTuple):
         height = ABOVE * radius if roof is None else 0.5 * math.dist(point, roof[0])
         hits, middle, far = [(point, normal)], along(point, normal, height), height + ABOVE * radius
         for way in _disk_around(normal, tangent):
+            length = math.hypot(*way)
+            # The finger does not get through a wall.
+            if self.surface.ray_cast(middle, scaled(way, 1.0 / length), length * radius) is not None:
+                continue
             felt = self.met(along(middle, way, radius), down, far)
             if felt is not None and dot(felt[1], normal) > FACING:
                 hits.append(felt)

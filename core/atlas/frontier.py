@@ -100,14 +100,14 @@ class Frontier:
     queue: list[tuple[float, int, RimPlace]] = field(default_factory=list)
     pushed: int = 0
 
-    def add(self, r: Reconstruction, least: float = 0.0, goes_on: float = 0.0) -> bool:
-        """Takes in a patch that was felt, and the places of its rim. Returns whether it did.
+    def add(self, r: Reconstruction, goes_on: float = 0.0) -> bool:
+        """Takes in a patch, and the places of its rim. Returns whether the finger felt it.
 
-        least, goes_on : lengths; patches that the finger feels to be smaller are left out, or have no places
+        goes_on : a length; patches that the finger feels to be smaller have no places
         """
         rim = radial_extent(r, self.finger, self.near)
         radius = r.radius * math.sqrt(np.mean(rim**2))
-        if radius <= least:
+        if radius <= 0.0:
             return False
         chart = stacked([r], [tabulate(r, rim, deviations=False)])
         self.charts = self.charts.joined(chart) if self.taps else chart

@@ -7,6 +7,7 @@ points are turned to their other side if the topology stays: the lattice is well
 that the cells whose corners differ are a manifold, and points are simple (Bertrand 1994).
 """
 
+import math
 from collections.abc import Generator
 from functools import cache
 from typing import NamedTuple
@@ -47,7 +48,9 @@ class Lattice(NamedTuple):
         return np.array([self.shape[1] * self.shape[2], self.shape[2], 1])
 
     def places(self, points: Indices) -> Array:
-        """Where points (n,) are, (n, 3)."""
+        """Where points (n,) are, (n, 3). Points beyond the first or the last are at that."""
+        # The level of a flat sheet goes through the faces of the grid, and with it points that are turned.
+        points = np.clip(points, 0, math.prod(self.shape) - 1)
         index = np.stack(np.unravel_index(points, self.shape), axis=1)
         return self.indicator.low + self.pitch * (index - 1.0)  # A layer is left for neighbors.
 

@@ -35,7 +35,6 @@ FIRST_EXTENT = 300.0  # A half curve of the first touch is at most this many tol
 GOOD = 10.0  # The first patch is looked for near the start if its radius is below this many tolerances,
 AWAY, EVERY = 30.0, 3  # up to this many tolerances away, at every third place of a disk.
 SMALL = 5.0  # Touches do not go on from a patch whose radius is below this many tolerances.
-NARROW = 1.0  # Where a touch was in vain before, a patch needs a radius of only this many tolerances.
 SIDE_BY_SIDE = 8  # This many touches at once are faster, and still done in a tenth of a second.
 AGAIN = 5  # Where something is missing or less certain, touches go on at most this often.
 CHECKS = 512  # This many rays from outside check the surface.
@@ -117,8 +116,7 @@ def _all_over(run: "_Run") -> Generator[Progress, object, None]:
             break
         farthest = LARGER * max(touch.place.radius for touch in chosen)
         contacts = [(touch.point, touch.outward) for touch in chosen]
-        least = [NARROW if touch.place.tried else SMALL for touch in chosen]
-        new = yield from run.showing(run.touching(contacts, farthest, least))
+        new = yield from run.showing(run.touching(contacts, farthest))
         for touch in chosen:
             run.frontier.tried(touch)
         yield from run.show(run.now(new=new))
@@ -175,7 +173,7 @@ class _Run:
         self.done = len(earlier)
         for e in earlier:
             is_sure = e.result.mean_height_std <= self.tolerance
-            if is_sure and self.frontier.add(e.result, NARROW * self.tolerance, SMALL * self.tolerance):
+            if is_sure and self.frontier.add(e.result, SMALL * self.tolerance):
                 self.found.append(e)
                 yield from self.show(self.now(new=[e]))
 
@@ -185,25 +183,24 @@ class _Run:
         return Progress(self.done, len(self.frontier.queue), tuple(new), joining, tuple(rims))
 
     def touching(
-        self, contacts: Sequence[PointNormal], farthest: float, least: Sequence[float]
+        self, contacts: Sequence[PointNormal], farthest: float
     ) -> Generator[None, None, list[Exploration]]:
-        """Touches at contacts; returns those that succeed, and adds their rims to the frontier.
-
-        least : the least radius of each, in tolerances; along a crease narrow ones would go on without end
-        """
+        """Touches at contacts; returns those that succeed, and adds their rims to the frontier."""
         points, outward = (np.array(values) for values in zip(*contacts, strict=True))
         results = yield from exploring_many(
             self.surface, points, outward, replace(self.options, farthest=farthest)
         )
         new = []
-        for e, point, up, times in zip(results, points, outward, least, strict=True):
+        for e, point, up in zip(results, points, outward, strict=True):
             # At an edge a fit may end up on the other side.
-            if isinstance(e, ValueError) or e.result.frame.axes[:, 2] @ up < FACING:
-                self.frontier.failed_points.append(vector_of(point))
-            elif self.frontier.add(e.result, times * self.tolerance, SMALL * self.tolerance):
+            if (
+                isinstance(e, Exploration)
+                and e.result.frame.axes[:, 2] @ up >= FACING
+                and self.frontier.add(e.result, SMALL * self.tolerance)
+            ):
                 new.append(e)
                 yield
-            elif times < SMALL:
+            else:
                 self.frontier.failed_points.append(vector_of(point))
         self.found += new
         self.done += len(contacts)
@@ -227,7 +224,7 @@ class _Run:
             few = left[far_apart(points[left], AGAIN_APART * farthest)]
             few = few[: min(SIDE_BY_SIDE, self.most - self.done)]
             some = list(zip(points[few], normals[few], strict=True))
-            new = yield from self.showing(self.touching(some, farthest, [NARROW] * len(some)))
+            new = yield from self.showing(self.touching(some, farthest))
             left = np.setdiff1d(left, few)
             left = left[~covered(self.frontier.charts, points[left], normals[left], AGAIN_APART, first)]
             yield from self.show(self.now(new=new))

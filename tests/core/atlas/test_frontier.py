@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where touches go on: beyond rims, elsewhere after one in vain, never inward; and what is left uncovered."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -74,12 +76,13 @@ def test_of_places_that_bring_as_much_but_for_rounding_the_first_is_next(frontie
     assert [place for _, _, place in sorted(frontier.queue)] == [places[2], *places[:2]]
 
 
-def test_nothing_goes_on_from_a_narrow_patch_and_a_narrower_one_is_left_out(first):
+def test_nothing_goes_on_from_a_narrow_patch_and_one_that_is_not_felt_is_left_out(first):
     found, radius = Frontier(Finger(BALL, 1.0), NEAR), first.radius
     assert found.add(first, goes_on=2.0 * radius)
     assert not found.queue
     assert len(found.charts.radii) == len(found.taps) == 1
-    assert not found.add(first, least=2.0 * radius)
+    found.finger = Finger(SimpleNamespace(ray_cast=lambda *_: None), 1.0)
+    assert not found.add(first)
     assert len(found.charts.radii) == len(found.taps) == 1
 
 
