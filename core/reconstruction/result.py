@@ -272,9 +272,8 @@ class Reconstruction(Judged):
         They are those of a surface that keeps its curvatures, as the prior's mean has them up to a sextic.
         """
         basis = monomials(self.contacts / self.radius, TERMS)
-        beyond = remainder(
-            *self.contacts[:, :2].T / self.radius, self.radius * self.k1, self.radius * self.k2
-        )
+        x, y = self.contacts[:, :2].T / self.radius
+        beyond = remainder(x, y, self.radius * self.k1, self.radius * self.k2)
         gram = basis.T @ basis
         gram.flat[:: len(gram) + 1] += UNSHOWN * gram.trace()
         coefficients: Array = NORMALS_BEND * solved_definite(gram, beyond @ basis)[2:FREE]
