@@ -94,6 +94,16 @@ def exact(seed, noise, noise_is_given=True):
     return surface, reconstruct(surface.point, given, outward=surface.normal)
 
 
+def automatic(seed, noise):
+    """A surface of SURFACES and its fit, with an automatic extent."""
+    surface, extent = list(SURFACES.values())[seed % len(SURFACES)]
+    rng = np.random.default_rng(seed)
+    planes, lengths = sampling(turn=rng.uniform(0.0, 180.0)), {"farthest": 2.0 * extent}
+    return surface, explore(
+        surface, surface.point, surface.normal, planes, noise=noise, rng=rng, **lengths
+    ).result
+
+
 def random(seed, noise):
     """A shape touched at a point as in accuracy.random_cases, and its fit in one of PLANES."""
     rng = np.random.default_rng(seed)
@@ -158,6 +168,7 @@ def cone(seed):
 ROWS = {
     **{f"exact, noise {noise:g}": partial(exact, noise=noise) for noise in (0.0, 0.02, 0.1)},
     "exact, noise 0.02, not given": partial(exact, noise=0.02, noise_is_given=False),
+    **{f"exact, noise {noise:g}, automatic": partial(automatic, noise=noise) for noise in (0.0, 0.02)},
     **{f"random shapes, noise {noise:g}": partial(random, noise=noise) for noise in (0.0, 0.05)},
     **{f"found point, {n} contacts": partial(found, count=n) for n in (15, 41, 101, 400)},
     **{f"found point, {n} contacts, noise given": partial(found, count=n, noise=NOISE) for n in (41, 400)},

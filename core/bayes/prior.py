@@ -41,10 +41,25 @@ def prior_mean(k1: Array, k2: Array) -> Array:
     return np.array([_mean_of_one(*pair) for pair in zip(k1.tolist(), k2.tolist(), strict=True)])
 
 
+def remainder(x: Array, y: Array, k1: float, k2: float) -> Array:
+    """The heights (n,) of a surface that keeps its curvatures, in unit radius, less those of its sextic.
+
+    They are 2 Q / (1 + sqrt(1 - G)), exact on a sphere and a cylinder, with Q and G as in `prior_mean`.
+    """
+    k1, k2 = _within_radius(k1), _within_radius(k2)
+    q, g = 0.5 * (k1 * x**2 + k2 * y**2), np.minimum((k1 * x) ** 2 + (k2 * y) ** 2, 1.0)
+    beyond: Array = 2.0 * q / (1.0 + np.sqrt(1.0 - g)) - q * (1.0 + g / 4.0 + g**2 / 8.0)
+    return beyond
+
+
+def _within_radius(curvature: float) -> float:
+    """A curvature in unit radius as the prior takes it: no surface keeps a radius of curvature below L."""
+    return min(max(curvature, -1.0), 1.0)
+
+
 def _mean_of_one(k1: float, k2: float) -> list[float]:
     """The prior's mean of one surface, in Python floats."""
-    # No surface keeps a radius of curvature below L.
-    k1, k2 = min(max(k1, -1.0), 1.0), min(max(k2, -1.0), 1.0)
+    k1, k2 = _within_radius(k1), _within_radius(k2)
     a, b = k1**2, k2**2
     mean = [0.0] * len(TERMS)
     mean[9:14:2] = k1 * a / 8.0, (k1 * b + k2 * a) / 8.0, k2 * b / 8.0

@@ -18,12 +18,14 @@ def gaussian_curvature_stds(r: Reconstruction, x: Array, y: Array) -> Array:
     """Standard deviations (m,) of K of a patch's polynomial at local x and y, (m,) each, in 1/length^2.
 
     They follow from the gradient of K in the coefficients and, since that does not suffice at a rim, from
-    the second-order variance of z_xx z_yy - z_xy^2 for normally distributed second derivatives. Few bends
-    widen them as they do those of curvatures at the point.
+    the second-order variance of z_xx z_yy - z_xy^2 for normally distributed second derivatives. Coefficients
+    of x^2, xy and y^2 are as certain as those of the curvatures at the point.
     """
     by = derived_monomials(np.stack([x, y], axis=-1) / r.radius, TERMS, PARTIALS[1:])
-    derivatives, covariance = by @ r.posterior.polynomial, r.posterior.covariance.copy()
-    covariance[2:FREE, 2:FREE] = r.curvature_covariance
+    derivatives, widening = by @ r.posterior.polynomial, np.ones(len(TERMS))
+    fitted = r.posterior.covariance
+    widening[2:FREE] = np.sqrt(r.curvature_covariance.diagonal() / fitted.diagonal()[2:FREE])
+    covariance = widening[:, None] * fitted * widening
     zx, zy, zxx, zxy, zyy = derivatives[:, :, None]
     steep = 1.0 + zx**2 + zy**2
     k = (zxx * zyy - zxy**2) / steep**2

@@ -18,7 +18,7 @@ from ..bayes.near_point import curvature_contradiction
 from ..bayes.normals import contradiction, measured_normals, scatter
 from ..bayes.other_curves import LEAST_CURVES, contradicting_curve
 from ..bayes.posterior import SurfacePosterior, coefficients_of, terms_to
-from ..bayes.prior import FREE
+from ..bayes.prior import FREE, remainder
 from ..bayes.roughness import EXPLAINED_TERMS
 from ..contours.contour import SURFACE_ENDS, Contour, read_only, stops_at
 from ..contours.curves import (
@@ -28,10 +28,11 @@ from ..contours.curves import (
     stacked,
 )
 from ..contours.local_geometry import Frame
+from ..lapack import solved_definite
 from ..paper import least_squares
 from ..patch.domain import AT_POINT, Domain
 from ..patch.geometry import Geometry, similarity, total_absolute_curvature
-from ..patch.monge import MongePatch, exponents, monomials
+from ..patch.monge import TERMS, MongePatch, exponents, monomials
 from ..patch.triangulation import patch_mesh
 from ..verdict import SIGNIFICANT, Doubt, Judged, beyond
 from . import status
@@ -40,6 +41,10 @@ from .status import Taps
 # This share of what surfaces are off polynomials is left at the point (benchmarks.real, and curvatures: with
 # 0.63 intervals of k1 hold in 84 % on exact surfaces).
 NEAR_POINT = 0.65
+# Normals bend a patch about as much again as heights do (cylinders, touched as far as three quarters of their
+# radius or more).
+NORMALS_BEND = 2.0
+UNSHOWN = 1e-6  # This share of a system's trace keeps directions out that contacts show by their noise alone.
 # The mesh is off the patch by at most this share of mean_height_std (benchmarks.patch_mesh, e20b52a).
 MESH_SHARE = 0.6
 
@@ -228,7 +233,8 @@ class Reconstruction(Judged):
         """The covariance of the coefficients of x^2, xy and y^2, (3, 3), in unit radius."""
         # One deviation in each direction: that of the coefficient of xy is larger by the square root of 2.
         facets = (0.5 * self.radius * self._facet_std) ** 2 * np.diag([1.0, 2.0, 1.0])
-        return self.bends.with_few(self._fitted_covariance) + facets
+        beyond = self._bent_beyond
+        return self.bends.with_few(self._fitted_covariance + np.outer(beyond, beyond)) + facets
 
     @property
     def _noise_share(self) -> float:
@@ -258,6 +264,20 @@ class Reconstruction(Judged):
             off = posterior.polynomial[2:FREE] - coefficients_of(self.patch.scaled(1.0 / self.radius))[2:FREE]
             covariance = covariance + np.outer(off, off)
         return covariance
+
+    @property
+    def _bent_beyond(self) -> Array:
+        """The coefficients (3,) of x^2, xy and y^2 by which the heights beyond its sextic bend a patch.
+
+        They are those of a surface that keeps its curvatures, as the prior's mean has them up to a sextic.
+        """
+        basis = monomials(self.contacts / self.radius, TERMS)
+        x, y = self.contacts[:, :2].T / self.radius
+        beyond = remainder(x, y, self.radius * self.k1, self.radius * self.k2)
+        gram = basis.T @ basis
+        gram.flat[:: len(gram) + 1] += UNSHOWN * gram.trace()
+        coefficients: Array = NORMALS_BEND * solved_definite(gram, beyond @ basis)[2:FREE]
+        return coefficients
 
     @property
     def _off_shape(self) -> list[float]:

@@ -9,7 +9,7 @@ import pytest
 import surfaces
 from scipy.spatial.transform import Rotation
 
-from core import Contour, SamplingPlane, reconstruct, reconstruct_many, suggest_plane, track
+from core import Contour, SamplingPlane, explore, reconstruct, reconstruct_many, suggest_plane, track
 from core.bayes import evidence, joint_fit, posterior, prior, sextic
 from core.patch.monge import TERMS, monomials
 from core.reconstruction import next_plane
@@ -419,6 +419,29 @@ def test_of_the_misfit_the_curvatures_feel_what_contacts_show_or_what_is_left_at
         r = s.fit([replace(contour, normals=None, noise=given) for contour in contours])
         found.append(r.k1_std * r.radius / (2.0 * np.sqrt(r.posterior.covariance[2, 2])))
     assert np.mean(found) == pytest.approx(share, rel=0.04)
+
+
+@pytest.mark.parametrize("k2", [-0.7, 0.0])
+def test_beyond_its_sextic_a_sphere_and_a_cylinder_have_the_remainder(k2):
+    x, y = np.random.default_rng(2).uniform(-0.7, 0.7, (2, 50))
+    flat = 0.49 * (x**2 + (k2 / 0.7 * y) ** 2)
+    exact = -flat / 0.7 / (1.0 + np.sqrt(1.0 - flat))
+    of_sextic = (
+        monomials(np.column_stack([x, y]), TERMS) @ prior_mean(-0.7, k2) - 0.35 * x**2 + 0.5 * k2 * y**2
+    )
+    assert prior.remainder(x, y, -0.7, k2) == pytest.approx(exact - of_sextic, abs=1e-14)
+
+
+@pytest.mark.parametrize("farthest", [15.0, 20.0, 30.0])
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_deviations_hold_where_curves_go_so_far_around_a_cylinder_that_no_sextic_follows(farthest, noise):
+    s = surfaces.cylinder(20.0)
+    for seed in range(6):
+        turn = np.random.default_rng(seed).uniform(0.0, 180.0)
+        planes = surfaces.planes(turn + np.array([0.0, 60.0, 120.0]))
+        touch = explore(s, s.point, s.normal, planes, farthest=farthest, noise=noise, rng=seed)
+        assert touch.result.status == "ok"
+        assert abs(touch.result.k1 - s.k1) <= 2.0 * touch.result.k1_std
 
 
 def prior_mean(k1, k2):
