@@ -120,7 +120,7 @@ def bends(given, noise=0.0, k=0.0):
     frame = core.Frame(np.zeros(3), np.eye(3))
     turned = [1, 0, 2]
     across = [
-        core.Contour(c.points[:, turned], normals=None if c.normals is None else c.normals[:, turned])
+        replace(c, points=c.points[:, turned], normals=None if c.normals is None else c.normals[:, turned])
         for c in given
     ]
     return bends_of(
@@ -170,6 +170,13 @@ def test_few_bends_add_only_what_the_fit_does_not_leave_open():
         assert found.with_few(share * few) == pytest.approx(share * few, rel=1e-6, abs=1e-12)
     across = np.diag([0.0, 1.0, 0.0])  # The fit leaves nothing else open along both curves.
     assert found.with_few(across) == pytest.approx(few + across, rel=1e-6, abs=1e-12)
+
+
+def test_what_the_deviation_of_normals_explains_is_no_fold():
+    angles = np.random.default_rng(3).normal(0.0, 0.03, 25)
+    noisy = contour(angles, np.full(24, 0.1))
+    assert bends([noisy]).stds.min() > 0.004
+    assert bends([replace(noisy, normal_std=0.05)]).stds == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("wide", [1, 2, 3])
