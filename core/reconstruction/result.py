@@ -247,7 +247,7 @@ class Reconstruction(Judged):
             return 1.0
         freedom = max(len(self.contacts) - EXPLAINED_TERMS, 1)
         shown = float(np.linalg.norm(self._residuals)) / (math.sqrt(freedom) * self.radius)
-        return min(max(max(shown, self.noise) / float(self.posterior.noise), NEAR_POINT), 1.0)
+        return float(np.clip(max(shown, self.noise) / float(self.posterior.noise), NEAR_POINT, 1.0))
 
     @property
     def _fitted_covariance(self) -> Array:
