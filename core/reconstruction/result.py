@@ -41,9 +41,6 @@ from .status import Taps
 # This share of what surfaces are off polynomials is left at the point (benchmarks.real, and curvatures: with
 # 0.63 intervals of k1 hold in 84 % on exact surfaces).
 NEAR_POINT = 0.65
-# Normals bend a patch about as much again as heights do (cylinders, touched as far as three quarters of their
-# radius or more).
-NORMALS_BEND = 2.0
 UNSHOWN = 1e-6  # This share of a system's trace keeps directions out that contacts show by their noise alone.
 # The mesh is off the patch by at most this share of mean_height_std (benchmarks.patch_mesh, e20b52a).
 MESH_SHARE = 0.6
@@ -269,14 +266,17 @@ class Reconstruction(Judged):
     def _bent_beyond(self) -> Array:
         """The coefficients (3,) of x^2, xy and y^2 by which the heights beyond its sextic bend a patch.
 
-        They are those of a surface that keeps its curvatures, as the prior's mean has them up to a sextic.
+        They are those of a surface that keeps its curvatures, as the prior's mean has them up to a sextic. A
+        process follows them.
         """
+        if (self.posterior.sextic or self.posterior).amplitude:
+            return np.zeros(3)
         basis = monomials(self.contacts / self.radius, TERMS)
         x, y = self.contacts[:, :2].T / self.radius
         beyond = remainder(x, y, self.radius * self.k1, self.radius * self.k2)
         gram = basis.T @ basis
         gram.flat[:: len(gram) + 1] += UNSHOWN * gram.trace()
-        coefficients: Array = NORMALS_BEND * solved_definite(gram, beyond @ basis)[2:FREE]
+        coefficients: Array = solved_definite(gram, beyond @ basis)[2:FREE]
         return coefficients
 
     @property
