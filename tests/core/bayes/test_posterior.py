@@ -432,16 +432,18 @@ def test_beyond_its_sextic_a_sphere_and_a_cylinder_have_the_remainder(k2):
     assert prior.remainder(x, y, -0.7, k2) == pytest.approx(exact - of_sextic, abs=1e-14)
 
 
-@pytest.mark.parametrize("farthest", [15.0, 20.0, 30.0])
 @pytest.mark.parametrize("noise", [0.0, 0.02])
-def test_deviations_hold_where_curves_go_so_far_around_a_cylinder_that_no_sextic_follows(farthest, noise):
-    s = surfaces.cylinder(20.0)
-    for seed in range(6):
-        turn = np.random.default_rng(seed).uniform(0.0, 180.0)
-        planes = surfaces.planes(turn + np.array([0.0, 60.0, 120.0]))
-        touch = explore(s, s.point, s.normal, planes, farthest=farthest, noise=noise, rng=seed)
-        assert touch.result.status == "ok"
-        assert abs(touch.result.k1 - s.k1) <= 2.0 * touch.result.k1_std
+def test_deviations_hold_where_curves_go_so_far_around_a_cylinder_that_no_sextic_follows(noise):
+    s, off = surfaces.cylinder(20.0), []
+    for farthest in (15.0, 20.0, 30.0):
+        for seed in range(6):
+            turn = np.random.default_rng(seed).uniform(0.0, 180.0)
+            planes = surfaces.planes(turn + np.array([0.0, 60.0, 120.0]))
+            r = explore(s, s.point, s.normal, planes, farthest=farthest, noise=noise, rng=seed).result
+            assert r.status == "ok"
+            off.append(abs(r.k1 - s.k1) / r.k1_std)
+    assert np.mean(np.array(off) <= 1.645) >= 0.75
+    assert max(off) <= 3.0
 
 
 def prior_mean(k1, k2):
