@@ -28,7 +28,6 @@ from ..contours.curves import (
     stacked,
 )
 from ..contours.local_geometry import Frame
-from ..lapack import solved_definite
 from ..paper import least_squares
 from ..patch.domain import AT_POINT, Domain
 from ..patch.geometry import Geometry, similarity, total_absolute_curvature
@@ -41,7 +40,6 @@ from .status import Taps
 # This share of what surfaces are off polynomials is left at the point (benchmarks.real, and curvatures: with
 # 0.63 intervals of k1 hold in 84 % on exact surfaces).
 NEAR_POINT = 0.65
-UNSHOWN = 1e-6  # This share of a system's trace keeps directions out that contacts show by their noise alone.
 # The mesh is off the patch by at most this share of mean_height_std (benchmarks.patch_mesh, e20b52a).
 MESH_SHARE = 0.6
 
@@ -266,18 +264,15 @@ class Reconstruction(Judged):
     def _bent_beyond(self) -> Array:
         """The coefficients (3,) of x^2, xy and y^2 by which the heights beyond its sextic bend a patch.
 
-        They are those of a surface that keeps its curvatures, as the prior's mean has them up to a sextic. A
-        process follows them.
+        They are those of a surface that keeps its curvatures, as the prior's mean has them up to a sextic. The
+        fit takes them as all heights (Rasmussen and Williams 2006, equation 2.8); a process follows them.
         """
         if (self.posterior.sextic or self.posterior).amplitude:
             return np.zeros(3)
-        basis = monomials(self.contacts / self.radius, TERMS)
-        x, y = self.contacts[:, :2].T / self.radius
-        beyond = remainder(x, y, self.radius * self.k1, self.radius * self.k2)
-        gram = basis.T @ basis
-        gram.flat[:: len(gram) + 1] += UNSHOWN * gram.trace()
-        coefficients: Array = solved_definite(gram, beyond @ basis)[2:FREE]
-        return coefficients
+        local, noise = self.contacts / self.radius, float(self.posterior.noise)
+        heights = remainder(local[:, 0], local[:, 1], self.radius * self.k1, self.radius * self.k2)
+        bent: Array = self.posterior.covariance[2:FREE] @ (heights @ monomials(local, TERMS)) / noise**2
+        return bent
 
     @property
     def _off_shape(self) -> list[float]:

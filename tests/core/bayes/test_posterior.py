@@ -442,8 +442,8 @@ def test_deviations_hold_where_curves_go_so_far_around_a_cylinder_that_no_sextic
             r = explore(s, s.point, s.normal, planes, farthest=farthest, noise=noise, rng=seed).result
             assert r.status == "ok"
             off.append(abs(r.k1 - s.k1) / r.k1_std)
-    assert np.mean(np.array(off) <= 1.645) >= 0.75
-    assert max(off) <= 3.0
+    assert np.mean(np.array(off) <= 1.645) >= 0.9
+    assert max(off) <= 2.0
 
 
 def prior_mean(k1, k2):
