@@ -264,8 +264,8 @@ class Reconstruction(Judged):
     def _bent_beyond(self) -> Array:
         """The coefficients (3,) of x^2, xy and y^2 by which the heights beyond its sextic bend a patch.
 
-        They are those of a surface that keeps its curvatures, as the prior's mean has them up to a sextic. The
-        fit takes them as all heights (Rasmussen and Williams 2006, equation 2.8); a process follows them.
+        They are those of a surface that keeps its curvatures, as the prior's mean has them up to a sextic.
+        The fit takes them as all heights (Rasmussen and Williams 2006, 2.8); a process follows them.
         """
         if (self.posterior.sextic or self.posterior).amplitude:
             return np.zeros(3)
