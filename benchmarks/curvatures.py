@@ -98,10 +98,8 @@ def automatic(seed, noise):
     """A surface of SURFACES and its fit, with an automatic extent."""
     surface, extent = list(SURFACES.values())[seed % len(SURFACES)]
     rng = np.random.default_rng(seed)
-    planes, lengths = sampling(turn=rng.uniform(0.0, 180.0)), {"farthest": 2.0 * extent}
-    return surface, explore(
-        surface, surface.point, surface.normal, planes, noise=noise, rng=rng, **lengths
-    ).result
+    place = surface, surface.point, surface.normal, sampling(turn=rng.uniform(0.0, 180.0))
+    return surface, explore(*place, farthest=2.0 * extent, noise=noise, rng=rng).result
 
 
 def random(seed, noise):

@@ -117,7 +117,7 @@ def process_hyperparameters(
     p = likelihoods(neg2_logs.reshape(1, len(kernels), -1), POWER).reshape(neg2_logs.shape)
     noise = np.sqrt(p.sum(axis=(0, 1)) @ noises**2)
     gram, count = (rows @ rows.T)[None], np.array([rows.shape[1]])
-    # With the largest noise alone for polynomials, a process would explain white noise that is below it.
+    # If polynomials had only the largest noise, a process would explain white noise that is below it.
     # What is added there to -2 log likelihood is taken off again.
     without = neg2_log_evidence(gram, count, 0.0 * gram, SEXTIC_VARIANCES, noises[None]) - 1.0
     best = min(neg2_logs.min(), without.min())
