@@ -6,6 +6,7 @@ import numpy as np
 
 from ..arguments import Array
 from ..bayes.prior import FREE
+from ..lapack import solved
 from ..patch.monge import PARTIALS, TERMS, derived_monomials
 from .result import Reconstruction
 
@@ -22,10 +23,10 @@ def gaussian_curvature_stds(r: Reconstruction, x: Array, y: Array) -> Array:
     of x^2, xy and y^2 are as certain as those of the curvatures at the point.
     """
     by = derived_monomials(np.stack([x, y], axis=-1) / r.radius, TERMS, PARTIALS[1:])
-    derivatives, widening = by @ r.posterior.polynomial, np.ones(len(TERMS))
-    fitted = r.posterior.covariance
-    widening[2:FREE] = np.sqrt(r.curvature_covariance.diagonal() / fitted.diagonal()[2:FREE])
-    covariance = widening[:, None] * fitted * widening
+    derivatives, fitted, widening = by @ r.posterior.polynomial, r.posterior.covariance, np.eye(len(TERMS))
+    factor, wanted = np.linalg.cholesky([fitted[2:FREE, 2:FREE], r.curvature_covariance])
+    widening[2:FREE, 2:FREE] = solved(factor, wanted.T, transposed=True).T
+    covariance = widening @ fitted @ widening.T
     zx, zy, zxx, zxy, zyy = derivatives[:, :, None]
     steep = 1.0 + zx**2 + zy**2
     k = (zxx * zyy - zxy**2) / steep**2

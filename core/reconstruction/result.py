@@ -20,6 +20,7 @@ from ..bayes.other_curves import LEAST_CURVES, contradicting_curve
 from ..bayes.posterior import SurfacePosterior, coefficients_of, terms_to
 from ..bayes.prior import FREE, remainder
 from ..bayes.roughness import EXPLAINED_TERMS
+from ..bayes.sextic import offset_share
 from ..contours.contour import SURFACE_ENDS, Contour, read_only, stops_at
 from ..contours.curves import (
     Curves,
@@ -271,6 +272,8 @@ class Reconstruction(Judged):
             return np.zeros(3)
         local, noise = self.contacts / self.radius, float(self.posterior.noise)
         heights = remainder(local[:, 0], local[:, 1], self.radius * self.k1, self.radius * self.k2)
+        # The height at the origin takes a share of their mean.
+        heights -= offset_share(np.ones((1, len(local))), np.array([self.point_std / noise])) * heights.mean()
         bent: Array = self.posterior.covariance[2:FREE] @ (heights @ monomials(local, TERMS)) / noise**2
         return bent
 
