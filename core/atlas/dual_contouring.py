@@ -31,6 +31,9 @@ SLACK = 1.0  # A vertex is at most this many pitches outside of its cell: the ti
 SOFT = 0.07  # A vertex does not move along planes that turn less, as mean squares of their sines: with .02 a
 # surface without creases has folds, as around Suzanne's eyes (some three times as many).
 ITERATIONS = 4  # With one, a cube's edges are off by 1e-4 of its size.
+# Vertices start this share of the way from where edges are crossed to the centers of cells: beside a point
+# of the lattice all these places are one. Without, an ellipsoid has folds; with .5 some edges are cut.
+CENTERED = 0.1
 LEVEL = 1e-6  # The weight of the indicator's level beside planes of patches.
 FACING = 0.95  # A sheet faces as the planes of a vertex do if the cosine between their normals is more.
 # A quadrilateral whose diagonals are this many pitches apart has a vertex of its own, at the place nearest to
@@ -203,7 +206,8 @@ def _vertices(
 ) -> tuple[Array, Array]:
     """The vertices (m, 3) of cells with centers (m, 3), and mean normals (m, 3) there.
 
-    They minimize the squares of distances to planes, from the mean of the places where these cross edges.
+    They minimize the squares of distances to planes, from near the mean of the places where these cross
+    edges.
 
     plane, cell : (k,), which of the planes (n,) through places (n, 3) are around which cell
     """
@@ -216,9 +220,9 @@ def _vertices(
         sums = [np.bincount(cell, weights * column[plane], count) for column in values.T]
         return np.stack(sums, axis=1) / total[:, None]
 
-    middle, up = mean(places), mean(normals)
+    start, up = mean(places) + CENTERED * (centers - mean(places)), mean(normals)
     square = mean((normals[:, :, None] * normals[:, None]).reshape(-1, 9)).reshape(-1, 3, 3)
-    right = mean(row_dot(normals, places)[:, None] * normals) - np.einsum("mij,mj->mi", square, middle)
+    right = mean(row_dot(normals, places)[:, None] * normals) - np.einsum("mij,mj->mi", square, start)
     # The step s minimizes |square s - right|^2 + SOFT^2 |s|^2, and again from there (iterated Tikhonov
     # regularization): it keeps what SOFT takes off where planes meet, and still does not move along them.
     soft = square @ square + SOFT**2 * np.eye(3)
@@ -227,7 +231,7 @@ def _vertices(
         left = right - np.einsum("mij,mj->mi", square, step)
         step += np.linalg.solve(soft, square @ left[..., None])[..., 0]
     reach = (0.5 + SLACK) * pitch
-    return np.clip(middle + step, centers - reach, centers + reach), up
+    return np.clip(start + step, centers - reach, centers + reach), up
 
 
 def _on_sheet(charts: Charts, reach: float, vertices: Array, up: Array, *own: Any) -> tuple[Any, ...]:
