@@ -33,7 +33,7 @@ SOFT = 0.07  # A vertex does not move along planes that turn less, as mean squar
 ITERATIONS = 4  # With one, a cube's edges are off by 1e-4 of its size.
 # Vertices start this share of the way from where edges are crossed to the centers of cells: beside a point
 # of the lattice all these places are one. Without, an ellipsoid has folds; with .5 some edges are cut.
-CENTERED = 0.1
+CENTERED = 0.15
 LEVEL = 1e-6  # The weight of the indicator's level beside planes of patches.
 FACING = 0.95  # A sheet faces as the planes of a vertex do if the cosine between their normals is more.
 # A quadrilateral whose diagonals are this many pitches apart has a vertex of its own, at the place nearest to
