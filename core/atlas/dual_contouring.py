@@ -31,7 +31,7 @@ SLACK = 1.0  # A vertex is at most this many pitches outside of its cell: the ti
 SOFT = 0.07  # A vertex does not move along planes that turn less, as mean squares of their sines: with .02 a
 # surface without creases has folds, as around Suzanne's eyes (some three times as many).
 ITERATIONS = 4  # With one, a cube's edges are off by 1e-4 of its size.
-# Vertices start this share of the way from where edges are crossed to the centers of cells: beside a point
+# Vertices start this share of the way from where edges are crossed to the centers of cells: next to a point
 # of the lattice all these places are one. Without, an ellipsoid has folds; with .5 some edges are cut.
 CENTERED = 0.15
 LEVEL = 1e-6  # The weight of the indicator's level beside planes of patches.
@@ -206,8 +206,8 @@ def _vertices(
 ) -> tuple[Array, Array]:
     """The vertices (m, 3) of cells with centers (m, 3), and mean normals (m, 3) there.
 
-    They minimize the squares of distances to planes, from near the mean of the places where these cross
-    edges.
+    They minimize the squares of distances to planes, from between the mean of the places where these cross
+    edges and the center.
 
     plane, cell : (k,), which of the planes (n,) through places (n, 3) are around which cell
     """
@@ -220,7 +220,8 @@ def _vertices(
         sums = [np.bincount(cell, weights * column[plane], count) for column in values.T]
         return np.stack(sums, axis=1) / total[:, None]
 
-    start, up = mean(places) + CENTERED * (centers - mean(places)), mean(normals)
+    crossed, up = mean(places), mean(normals)
+    start = crossed + CENTERED * (centers - crossed)
     square = mean((normals[:, :, None] * normals[:, None]).reshape(-1, 9)).reshape(-1, 3, 3)
     right = mean(row_dot(normals, places)[:, None] * normals) - np.einsum("mij,mj->mi", square, start)
     # The step s minimizes |square s - right|^2 + SOFT^2 |s|^2, and again from there (iterated Tikhonov

@@ -111,13 +111,14 @@ def test_a_shorter_edge_length_helps_against_holes(empty):
     empty.ops.mesh.primitive_grid_add(x_subdivisions=100, y_subdivisions=100)
     for vertex in empty.context.object.data.vertices:
         vertex.co.z = 0.35 * math.sin(4.0 * vertex.co.x)
-    empty.ops.tactile.touch_all_over(tolerance=0.04, edge=0.5)
-    record = empty.context.object["tactile_object"]
-    for edge in np.arange(0.5, 0.8, 0.025):  # Which of them leave holes is chance.
-        if "holes" not in [doubt["code"] for doubt in record["doubts"]]:
-            empty.ops.tactile.mesh_again(edge=edge)
-            record = empty.context.object["tactile_object"]
-    assert "holes" in [doubt["code"] for doubt in record["doubts"]]
+    empty.ops.tactile.touch_all_over(tolerance=0.04)
+    for edge in np.arange(0.5, 0.8, 0.025):  # Which of them leave holes depends on the lattice.
+        empty.ops.tactile.mesh_again(edge=edge)
+        record = empty.context.object["tactile_object"]
+        if "holes" in [doubt["code"] for doubt in record["doubts"]]:
+            break
+    else:
+        pytest.fail("no edge leaves holes")
     assert empty.ops.tactile.mesh_again(edge=0.3) == {"FINISHED"}
     assert empty.context.object["tactile_object"]["status"] == "ok"
 

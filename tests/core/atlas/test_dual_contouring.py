@@ -85,6 +85,18 @@ def test_a_vertex_is_where_walls_meet_but_stays_where_they_hardly_turn(turn, x):
     assert vertices[0, 0] == pytest.approx(x, abs=0.05)
 
 
+def test_the_vertices_around_a_point_that_is_nearly_on_a_wall_are_apart():
+    """All four cross the wall next to that point only: from there their triangles would be needles."""
+    height = np.array([[0.0, 0.0, 1e-6]])
+    plane = Blend(
+        np.zeros(1), np.zeros(1), np.array([[0.0, 0.0, 1.0]]), np.zeros(1, dtype=np.intp), np.zeros(1)
+    )
+    centers = 0.5 * np.array([[x, y, 1.0] for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1))])
+    vertices, _ = _vertices(np.zeros(4, dtype=np.intp), np.arange(4), height, plane, centers, 1.0)
+    assert vertices[:, 2] == pytest.approx(1e-6, abs=1e-4)
+    assert np.linalg.norm(vertices - np.roll(vertices, 1, axis=0), axis=1).min() > 0.1
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_any_signs_make_a_closed_manifold(far, seed):
     values = np.full((14, 14, 14), -1.0)
