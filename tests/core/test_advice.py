@@ -200,10 +200,11 @@ def off_surface():
 
 def confused():
     """Two balls with a gap, felt by strokes that are farther apart than it, and nearer."""
-    found = []
+    # Along an axis of the rings ties of distances would leave it to rounding which strokes are neighbors.
+    found, apart = [], 1.03 * np.array([1.0, 0.1, 0.3]) / math.hypot(1.0, 0.1, 0.3)
     for gap in (0.2, 0.1):
         one = [0.5 * ring for ring in rings_of_ball(gap=gap)]
-        found.append(core.atlas_of([*one, *(ring + np.array([1.02, 0.0, 0.0]) for ring in one)]).doubts)
+        found.append(core.atlas_of([*one, *(ring + apart for ring in one)]).doubts)
     return found
 
 
