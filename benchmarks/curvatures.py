@@ -99,7 +99,8 @@ def automatic(seed, noise):
     surface, extent = list(SURFACES.values())[seed % len(SURFACES)]
     rng = np.random.default_rng(seed)
     place = surface, surface.point, surface.normal, sampling(turn=rng.uniform(0.0, 180.0))
-    return surface, explore(*place, farthest=2.0 * extent, noise=noise, rng=rng).result
+    farthest = rng.uniform(1.0, 3.0) * extent
+    return surface, explore(*place, farthest=farthest, noise=noise, rng=rng).result
 
 
 def random(seed, noise):

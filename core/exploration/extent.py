@@ -23,7 +23,7 @@ from ..reconstruction.explained import are_few, too_far
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import DOUBTFUL_FIT, DOUBTFUL_STD
-from ..verdict import OK
+from ..verdict import NOTICED, OK
 from .facets import with_facets
 from .options import ExplorationOptions
 from .taps import tapped
@@ -257,11 +257,14 @@ def _are_shorter_worse(r: Reconstruction) -> bool:
 
 
 def _is_sure(r: Reconstruction, options: ExplorationOptions) -> bool:
-    """Whether a patch is as certain as the options require, and taps show the surface there."""
-    off = 0.0 if r.taps is None else (r.taps.height or 0.0) / r.radius + r.taps.missing
+    """Whether a patch is as certain as the options require, and taps and the contacts near it agree."""
+    if options.largest_std is not None:
+        return r.mean_height_std <= options.largest_std
     # Of all doubts, the deviation of the height is the one that is known already.
-    is_certain = r.mean_height_std <= (options.largest_std or DOUBTFUL_STD * r.radius)
-    return is_certain and (options.largest_std is not None or (r.status == OK and off <= TAPS_OFF))
+    if r.mean_height_std > DOUBTFUL_STD * r.radius or r.status != OK:
+        return False
+    off = 0.0 if r.taps is None else (r.taps.height or 0.0) / r.radius + r.taps.missing
+    return off <= TAPS_OFF and r.curvature_contradiction <= NOTICED
 
 
 def _explains(explored: Exploration, options: ExplorationOptions) -> bool:

@@ -128,6 +128,16 @@ def short_waves():
     )
 
 
+def test_over_a_wave_curves_are_as_long_as_the_curvatures_at_the_point_are_right():
+    wave = surfaces.sine()
+    planes = [core.SamplingPlane(math.radians(azimuth)) for azimuth in (20.0, 80.0, 140.0)]
+    r = explore(wave, wave.point, wave.normal, planes, farthest=28.0).result
+    off = np.abs(np.subtract((r.k1, r.k2), (wave.k1, wave.k2)))
+    assert r.status == "ok"
+    assert (off < 3.0 * np.array([r.k1_std, r.k2_std])).all()
+    assert off.max() * r.radius < 0.03
+
+
 def test_what_is_too_rough_for_any_fit_to_be_trusted_is_not_fitted(monkeypatch):
     fits = []
     monkeypatch.setattr(touches, "fitted", lambda *given: fits.append(1) or fitted(*given))
