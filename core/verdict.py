@@ -14,7 +14,8 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 # What is off by more standard deviations is looked at more closely. With SIGNIFICANT in its place, 4 of 24
-# curves that are turned or shifted are missed, and .7 % of curvatures on exact surfaces (benchmarks.curvatures).
+# curves that are turned or shifted are missed, and .7 % of curvatures of exact surfaces are far off
+# (benchmarks.curvatures).
 NOTICED = 3.0
 SIGNIFICANT = 5.0  # Noise does not explain what is off by more standard deviations (benchmarks.stability).
 OK, UNCERTAIN, NOT_CONVERGED = "ok", "uncertain", "not_converged"  # Each status.
