@@ -31,7 +31,6 @@ from .contours.finger import Surface
 from .contours.local_geometry import DegenerateCurvesError, Frame
 from .contours.tracking import track
 from .exploration.extent import Exploration
-from .exploration.facets import is_beside_bend, with_facets
 from .exploration.options import ExplorationOptions
 from .exploration.taps import MeshError, doubts_by_mesh, mesh_error
 from .exploration.touches import explore, explore_many, exploring_many
@@ -40,6 +39,7 @@ from .patch.domain import Domain
 from .patch.geometry import Geometry, distances, fit_error
 from .patch.monge import MongePatch
 from .reconstruction.deviations import gaussian_curvature_stds
+from .reconstruction.facets import is_beside_bend, with_facets
 from .reconstruction.from_contours import reconstruct, reconstruct_many
 from .reconstruction.next_plane import suggest_plane
 from .reconstruction.options import METHODS

@@ -20,11 +20,11 @@ from ..contours.contour import EXTENT, UNEXPLAINED, Contour, SamplingPlane, stop
 from ..contours.finger import Surface
 from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.explained import are_few, too_far
+from ..reconstruction.facets import with_facets
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import DOUBTFUL_FIT, DOUBTFUL_STD
 from ..verdict import NOTICED, OK
-from .facets import with_facets
 from .options import ExplorationOptions
 from .taps import tapped
 

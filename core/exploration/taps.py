@@ -12,12 +12,11 @@ from ..contours.contour import Vector, along, dot, scaled, vector_of
 from ..contours.finger import Surface, contact_of
 from ..patch.domain import GAUSS_ALONG, Domain
 from ..reconstruction.result import Reconstruction
-from ..reconstruction.status import CONTRADICTING, DOUBTFUL_GAP, Taps, useless
+from ..reconstruction.status import CONTRADICTING, DOUBTFUL_FIT, DOUBTFUL_GAP, Taps, useless
 from ..verdict import OK, Doubt, beyond
 
 # benchmarks.refusals of e20b52a counted the patches that are off, but ok.
 HAIR = 1e-4  # A ray continues this share of its reach behind each layer of the mesh.
-ABOVE = 0.01  # A ray from this share of the radius above a point meets its own layer.
 # Four taps between two ends of curves are at this share of the way to the boundary: without them two of 540
 # touches of scans miss a pocket (benchmarks.real --only automatic).
 NEAR_RIM = 0.98
@@ -87,7 +86,8 @@ def heights_at(r: Reconstruction, surface: Surface, feet: Array) -> Array:
 
 def _side_of(r: Reconstruction, surface: Surface) -> float:
     """1 if the outside of the surface is up at the point, or -1 if it is down: a sheet has either side."""
-    up, reach = vector_of(r.frame.axes[:, 2]), ABOVE * r.radius
+    # Above and below the point, the surface is as near as contacts are to a patch that is not in doubt.
+    up, reach = vector_of(r.frame.axes[:, 2]), DOUBTFUL_FIT * r.radius
     start = along(vector_of(r.frame.origin), up, reach)
     hit = surface.ray_cast(start, scaled(up, -1.0), 2.0 * reach)
     return 1.0 if hit is None else math.copysign(1.0, dot(contact_of(hit, 1.0)[1], up))

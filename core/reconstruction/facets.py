@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..arguments import SMALLEST, Array
 from ..contours.contour import cross, read_only
 from ..patch.differential_geometry import Derivatives
-from ..reconstruction.result import Reconstruction
+from .result import Reconstruction
 
 # benchmarks.facets shows how far curvatures are off with these.
 # The shape's are those by which facets turn within the first number of widths, and those of the corners of
