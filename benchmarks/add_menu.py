@@ -5,7 +5,6 @@
 `python -m benchmarks.add_menu ZIP [--only NAME]`, from the root of a checkout; ZIP is the built extension.
 It prints a Markdown table and draws build/charts/add_menu.jpg, objects above and what was felt of them below.
 With --scans the objects are a cube and the scans of a bottle and of a pear, in build/charts/touched.jpg.
-With --expected it only prints how many touches and seconds the dialog expects of each.
 
 Deviations are those of the report, both ways between surface and object, in tolerances (1/500 of the size).
 Open edges, Euler number and pieces are of the touched surface, and in brackets of the object where these
@@ -92,16 +91,6 @@ def touched(add):
     source = bpy.context.object
     seconds, _ = timed(bpy.ops.tactile.touch_all_over, target=source.name)
     return source, bpy.context.view_layer.objects.active, seconds
-
-
-def expected(addon, add):
-    """How many touches the dialog expects of the object that a function adds, seconds, and shares."""
-    import bpy
-
-    add()
-    mesh = addon.touch.detached_mesh.DetachedMesh(bpy.context.object, bpy.context.evaluated_depsgraph_get())
-    tolerance = addon.whole_object.object_touches.tolerance_of(mesh.size, "normal", 0.0)
-    return addon.whole_object.object_operators.expected(mesh, tolerance, 0.0)
 
 
 def shape_of(obj, *, merged):
@@ -210,16 +199,9 @@ def main():
     parser = parser_of(__doc__, takes_zip=True)
     parser.add_argument("--only", default="", help="only objects with this in their names")
     parser.add_argument("--scans", action="store_true", help="a cube, a bottle and a pear instead")
-    parser.add_argument("--expected", action="store_true", help="print only what the dialog expects")
     options = parser.parse_args()
-    addon = blender.start(options.zip).tactile_addon
+    blender.start(options.zip)
     adds = scans() if options.scans else shapes()
-    if options.expected:
-        with blender.quiet():
-            found = [(name, *expected(addon, add)) for name, add in adds.items()]
-        rows = [[name, f"{touches}", f"{seconds:.0f}"] for name, touches, seconds, *_ in found]
-        table(["object", "touches expected", "seconds expected"], rows)
-        return
     some = {name: add for name, add in adds.items() if options.only in name}
     print_touched(some, "touched" if options.scans else "add_menu")
     print(f"{machine('bpy', 'numpy', 'scipy')}.")

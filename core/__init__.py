@@ -8,11 +8,11 @@ has negative curvatures, because normals point outward.
 
 from .atlas.boundaries import Edge
 from .atlas.curvature import vertices_shown
-from .atlas.expected import covered_by, expected_touches, thinnest_wall
 from .atlas.measured import atlas_of, cover_contacts
 from .atlas.meshing import Mesh, shortest_edge
 from .atlas.object_atlas import Atlas, NextTouch
-from .atlas.touching import Progress, explore_object, touch_all_over
+from .atlas.samples import thinnest_wall
+from .atlas.touching import Progress, covered_by, explore_object, touch_all_over
 from .contact_data.comments import UNIT_METERS
 from .contact_data.rows import Contacts
 from .contact_data.table import contacts_from_csv, contacts_to_csv

@@ -2,14 +2,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Samples of the surface of many patches, each with its share of the area, and the indicator of these."""
 
+import math
 from collections.abc import Generator
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ..arguments import Array
+from ..arguments import LARGEST, Array, finite_array, number, unit_vector
+from ..contours.contour import vector_of
+from ..contours.finger import Surface
 from ..steps import chunked
 from ..triangles import row_dot
 from .charts import PLACES_AT_ONCE, STEEPEST, Charts
@@ -25,6 +28,7 @@ FINEST, COARSEST = 1.0 / 400.0, 1.0 / 80.0  # Cells are between these shares of 
 TOLERANCES = 5.0  # A cell is at most this many tolerances.
 OPPOSITE = -0.9  # Two patches are the sides of a wall or gap if the cosine between their normals is less.
 THIN_SHARE = 0.003  # Walls are at least as thick as all but this share of the area is.
+INSIDE = 1e-5  # Rays across walls begin this share of the size below the surface.
 CERTAIN = 5.0  # Two sides that are nearer than this many deviations are no wall or gap.
 PATCHES_AT_ONCE = 20  # A step takes this many patches.
 
@@ -149,3 +153,25 @@ def _samples(
     own = weights_of(share, charts.radii[patch] * charts.stds_at(x, y, patch) * steep, charts.radii[patch])
     areas = flat * own / (own + others) / np.maximum(steep, STEEPEST)
     return Samples(*(values[inside] for values in (points, normals, areas, thickness)))
+
+
+def thinnest_wall(surface: Surface, points: ArrayLike, outward: ArrayLike, size: float) -> float:
+    """The thickness that all but the share THIN_SHARE of the walls of an object exceed; inf if it has none.
+
+    points, outward : (n, 3), places spread evenly over the object, and the outward directions there
+    size : of the object; walls are thinner
+
+    Raises ValueError for bad arguments. A wall's sides face opposite ways, as for `Samples.thickness`.
+    """
+    p = finite_array("points", points, (None, 3), LARGEST)
+    if not len(p):
+        raise ValueError("points: expected one or more, got none")
+    inward = [unit_vector("outward", -up) for up in finite_array("outward", outward, p.shape, LARGEST)]
+    size = number("size", size, above=0.0)
+    starts = p + INSIDE * size * np.array(inward)  # It is off the surface, which the ray would meet.
+    hits = [surface.ray_cast(vector_of(a), vector_of(b), size) for a, b in zip(starts, inward, strict=True)]
+    thickness = [
+        math.dist(hit[0], point) if hit is not None and np.dot(hit[1], way) > -OPPOSITE else math.inf
+        for hit, point, way in zip(hits, p, inward, strict=True)
+    ]
+    return sorted(thickness)[int(THIN_SHARE * len(p))]

@@ -17,6 +17,7 @@ from ..contours.tracking import generator_of
 from ..exploration.extent import Exploration
 from ..exploration.options import ExplorationOptions
 from ..exploration.touches import exploring_many
+from ..reconstruction.result import Reconstruction
 from ..steps import part_of, result_of
 from ..triangles import far_apart, normalized, row_dot
 from .borders import felt_border, snapped_to_border
@@ -386,3 +387,17 @@ def explore_object(
             state = steps.send(more)
     except StopIteration as end:
         return end.value
+
+
+def covered_by(r: Reconstruction, rim: Array, points: Array, tolerance: float) -> NDArray[np.bool_]:
+    """Which points (n, 3) of the world are inside the rim of a patch, and as near to it as a finger feels it.
+
+    rim : how far the patch reaches from its point all round, (k,), lengths, from azimuth 0 on
+    """
+    x, y, z = r.frame.to_local(points).T
+    azimuths = np.linspace(0.0, 2.0 * np.pi, len(rim), endpoint=False)
+    is_covered: NDArray[np.bool_] = np.hypot(x, y) < np.interp(
+        np.arctan2(y, x), azimuths, rim, period=2.0 * np.pi
+    )
+    is_covered[is_covered] = np.abs(z[is_covered] - r.height(x[is_covered], y[is_covered])) < NEAR * tolerance
+    return is_covered

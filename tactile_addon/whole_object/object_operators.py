@@ -3,7 +3,6 @@
 """Touch All Over: touches that grow over an object by themselves; and the buttons of their surface."""
 
 from collections.abc import Iterator, Sequence
-from time import perf_counter
 from typing import Any
 
 import bpy
@@ -12,8 +11,6 @@ from bpy.props import EnumProperty, FloatVectorProperty, IntProperty
 from mathutils import Vector
 
 from ... import core
-from ...core.arguments import many
-from ...core.triangles import triangle_cross
 from ..probes import probe
 from ..probes.in_slices import AllOver, InSlices, Progress
 from ..probes.operators import (
@@ -31,6 +28,7 @@ from ..touch import units
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.evaluated_mesh import read_array
 from ..touch.settings import NOISE, UNSAVED, given, length_property
+from ..touch.touch_object import FARTHEST_SHARE
 from ..touch.types import Object, Outcome
 from . import whole_mesh
 from .both_ways import DIRECTIONS, LIFT, THIN_SHARE
@@ -47,13 +45,8 @@ ACCURACIES = [
     ("normal", "Normal", "A tolerance of 1/500 of the object's size"),
     ("fine", "Fine", "A tolerance of 1/1250 of the object's size: many touches"),
 ]
-PLACES, SEED = 600, 0  # A few of these random places are touched for the estimate.
-# The time of a touch with its part of joining, and that of a mesh, as multiples of the time of a touch that
-# is tried: python -m benchmarks.add_menu.
-JOINING, MESHING = 3.3, 60.0
-# Edges are a quarter of a wall that is thinner than the size by the first factor or more. Walls that are
-# thinner by the second one have no shorter edges.
-THIN, THINNEST = 16.0, 133.0
+# Before it begins, walls are measured at so many random places, and the first of these are touched.
+PLACES, TRIED, SEED = 600, 12, 0
 SEEN = 1.0  # The place is seen from so many sizes of the object, so that what is around it is seen, too.
 REACHED = 0.5  # A surface with less than this share of the largest deviation does not reach the object there.
 # The ObjectTouches of the last surface by the session_uid of its object; one at most.
@@ -118,31 +111,6 @@ class Growing(WithTouches):
         if self._growing is not None:
             self._growing.remove()
             self._growing = None
-
-
-def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, float, float, float]:
-    """About how many touches a DetachedMesh takes, seconds, its share with few facets, its thinnest wall's.
-
-    Raises ValueError if no touch is possible.
-    """
-    import scipy.interpolate  # noqa: F401  # The import takes half a second, which is not a touch's.
-
-    area = 0.5 * float(np.linalg.norm(triangle_cross(mesh.points[mesh.triangles]), axis=1).sum())
-    places = core.scattered(mesh.points, mesh.triangles, PLACES, np.random.default_rng(SEED))
-    begin = perf_counter()
-    touches, tried, patches = core.expected_touches(
-        mesh, *places, area, tolerance=tolerance, noise=noise, rng=SEED
-    )
-    each = (perf_counter() - begin) / tried
-    areas = np.array([r.domain.area for r in patches])
-    share = float(np.average([mesh.is_of_facets(r) for r in patches], weights=areas))
-    wall = core.thinnest_wall(mesh, *places, mesh.size) / mesh.size
-    return units.rough(touches), (MESHING * fineness(wall) + JOINING * touches) * each, share, wall
-
-
-def fineness(wall: float) -> float:
-    """How many times as many triangles a surface has if its thinnest wall has this share of the size."""
-    return float(np.clip(1.0 / wall, THIN, THINNEST) / THIN) ** 2
 
 
 class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
@@ -210,18 +178,24 @@ class TACTILE_OT_touch_all_over(Growing, AllOver, bpy.types.Operator):
         return report_done(self, object_summary(record), record["status"] == "ok")
 
     def _estimate(self, context: bpy.types.Context, target: Object) -> str:
-        """A sentence on the tolerance, the touches and the seconds. The mesh is kept until it changes."""
+        """A sentence on the tolerance; and warnings. The mesh is kept until it changes."""
         if self._is_reshaped:
             self._mesh = DetachedMesh(target, context.evaluated_depsgraph_get())
-        tolerance = self.tolerance or tolerance_of(self._mesh.size, self.accuracy, self.noise)
-        touches, seconds, share, wall = expected(self._mesh, tolerance, self.noise)
-        self._is_faceted = share >= FACETED
+        mesh = self._mesh
+        tolerance = self.tolerance or tolerance_of(mesh.size, self.accuracy, self.noise)
+        points, outward = core.scattered(mesh.points, mesh.triangles, PLACES, np.random.default_rng(SEED))
+        options: dict[str, Any] = {"largest_std": tolerance, "noise": self.noise, "rng": SEED}
+        options["farthest"] = FARTHEST_SHARE * mesh.size
+        tried = core.explore_many(mesh, points[:TRIED], outward[:TRIED], **options)
+        patches = [e.result for e in tried if not isinstance(e, ValueError)]
+        facets = sum(r.domain.area for r in patches if mesh.is_of_facets(r))
+        self._is_faceted = facets > FACETED * sum(r.domain.area for r in patches)
         warnings = ["Touches will feel its facets one by one"] * self._is_faceted
+        wall = core.thinnest_wall(mesh, points, outward, mesh.size) / mesh.size
         if wall < THIN_SHARE:
             warnings.append(f"Walls of {100.0 * wall:.2g} % of its size may be bridged or pierced")
         self._warnings = warnings
-        words = units.say_of({"size": self._mesh.size}, tolerance)  # in the unit that the panel has
-        return f"Tolerance {words}: about {many(touches, 'touch', 'touches')}, {units.duration(seconds)}"
+        return f"Tolerance {units.say_of({'size': mesh.size}, tolerance)}"  # in the unit that the panel has
 
     def draw(self, context: bpy.types.Context) -> None:
         super().draw(context)

@@ -194,7 +194,7 @@ def test_quick_and_fine_have_other_tolerances(empty, ball):
 
 
 def dialog_of(extension):
-    """The dialog of Touch All Over without a window; its `words` say what an object takes."""
+    """The dialog of Touch All Over without a window, and its `words`."""
     operator = extension.tactile_addon.whole_object.object_operators.TACTILE_OT_touch_all_over
 
     class Dialog:
@@ -207,15 +207,11 @@ def dialog_of(extension):
     return Dialog()
 
 
-@pytest.mark.long
-def test_a_dialog_can_tell_how_many_touches_there_will_be(extension, empty, ball):
+def test_a_dialog_names_the_tolerance(extension, empty, ball):
     dialog = dialog_of(extension)
-    words = dialog.words(empty.context, ball, tolerance=0.02)
-    assert words.startswith("Tolerance 0.02 m: about ") and " touches, " in words
-    count = int(words.split()[4])
-    record = made(empty.ops.tactile.touch_all_over, "tactile_object", tolerance=0.02)[1]
-    assert 0.5 < count / record["touches"] < 2.0
-    assert dialog.words(empty.context, ball, tolerance=0.005) != words
+    assert dialog.words(empty.context, ball, tolerance=0.02) == "Tolerance 0.02 m"
+    assert dialog.words(empty.context, ball) == "Tolerance 0.008 m"
+    assert dialog._warnings == []
 
 
 def test_a_dialog_can_tell_that_facets_will_be_felt(extension, empty):
@@ -236,12 +232,3 @@ def test_a_dialog_can_tell_that_walls_are_thin(extension, empty):
     empty.context.view_layer.update()
     dialog.words(empty.context, empty.context.object)
     assert dialog._warnings == ["Walls of 1 % of its size may be bridged or pierced"]
-
-
-def test_the_mesh_of_thin_walls_is_fine(extension):
-    """Each halving of a wall halves edges, until the grid is as fine as it may be."""
-    fineness = extension.tactile_addon.whole_object.object_operators.fineness
-    assert fineness(np.inf) == fineness(1.0) == fineness(1.0 / 16.0) == 1.0
-    assert fineness(1.0 / 32.0) == pytest.approx(4.0)
-    assert fineness(1.0 / 64.0) == pytest.approx(16.0)
-    assert fineness(1e-3) == fineness(1e-5) < 80.0

@@ -482,3 +482,18 @@ def test_a_larger_tolerance_takes_fewer_touches_and_is_kept(solid, most):
         for mesh in (atlas.reference.mesh, atlas.mesh(0.03)):
             assert mesh.is_closed
             assert np.abs(solid.distances(mesh.vertices)).max() < 3.0 * tolerance
+
+
+def test_a_patch_covers_what_is_inside_its_rim_and_near_to_it():
+    ball = solids.ball()
+    r = core.explore(ball, ball.start, ball.outward, farthest=0.4).result
+    radius, turns = r.radius, np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
+    rim = radius * (1.0 - 0.4 * (np.cos(turns) > 0.0))  # It reaches less far on the side of d1.
+    across = np.array([0.5, 0.7, -0.7, 0.95, -0.95, -1.05]) * radius
+    points = r.frame.to_world(np.column_stack([across, 0.0 * across, r.height(across, 0.0 * across)]))
+    inside = [True, False, True, False, True, False]
+    assert core.covered_by(r, rim, points, 1e-3).tolist() == inside
+    normal = r.frame.axes[:, 2]
+    assert core.covered_by(r, rim, points + 2.9e-3 * normal, 1e-3).tolist() == inside
+    assert not core.covered_by(r, rim, points + 3.1e-3 * normal, 1e-3).any()
+    assert not core.covered_by(r, rim, -points, 1e-3).any()  # The other side of the ball is over it, too.
