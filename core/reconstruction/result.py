@@ -268,13 +268,14 @@ class Reconstruction(Judged):
         They are those of a surface that keeps its curvatures, as the prior's mean has them up to a sextic.
         The fit takes them as all heights (Rasmussen and Williams 2006, 2.8); a process follows them.
         """
-        if (self.posterior.sextic or self.posterior).amplitude:
+        posterior = self.posterior.sextic or self.posterior
+        if posterior.amplitude:
             return np.zeros(3)
-        local, noise = self.contacts / self.radius, float(self.posterior.noise)
+        local, noise = self.contacts / self.radius, float(posterior.noise)
         heights = remainder(local[:, 0], local[:, 1], self.radius * self.k1, self.radius * self.k2)
         # The height at the origin takes a share of their mean.
         heights -= offset_share(np.ones((1, len(local))), np.array([self.point_std / noise])) * heights.mean()
-        bent: Array = self.posterior.covariance[2:FREE] @ (heights @ monomials(local, TERMS)) / noise**2
+        bent: Array = posterior.covariance[2:FREE] @ (heights @ monomials(local, TERMS)) / noise**2
         return bent
 
     @property

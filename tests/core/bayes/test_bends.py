@@ -73,6 +73,22 @@ def test_no_touch_across_a_fold_of_a_curved_surface_is_sure_of_its_curvature(k1,
             assert not is_silent(r, k1, k2)
 
 
+@pytest.mark.parametrize("at", [-0.002, 0.0, 0.002])
+def test_folds_on_both_sides_of_a_curved_top_do_not_make_the_curvature_along_them_unknown(at):
+    slope = math.tan(math.radians(10.0))
+    s = surfaces.Exact(
+        lambda x, y, z: z + 0.5 * (x * x + y * y) + slope * np.maximum(np.abs(x) - TOP, 0.0),
+        lambda p: np.array([slope * np.sign(p[0]) * (abs(p[0]) > TOP) + p[0], p[1], 1.0]),
+        np.array([at, 0.0, -0.5 * at * at]),
+        -1.0,
+        -1.0,
+    )
+    r = core.explore(s, s.point, s.normal, surfaces.planes((30, 90, 150)), farthest=1.5).result
+    assert r.posterior.sextic is not None  # It averages the folds.
+    assert not is_silent(r, -1.0, -1.0)
+    assert r.k2_std < 0.6
+
+
 @pytest.mark.parametrize("turn", [0, 10, 20, 30])
 def test_an_automatic_touch_between_folds_stays_on_its_face(turn):
     s, planes = fold(20), surfaces.planes(turn + np.array([0.0, 60.0, 120.0]))
