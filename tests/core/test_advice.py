@@ -18,8 +18,8 @@ from tests.core.atlas.test_measured import ball, cap_rows, few_on_box, rings_of_
 from tests.core.bayes.test_bends import fold
 from tests.core.bayes.test_measured_normals import measured, tilted, touched
 from tests.core.bayes.test_near_point import cone
-from tests.core.reconstruction.test_facets import arc, judged, rounded
 from tests.core.exploration.test_taps import FARTHEST, UP, Holes, Sector, explore
+from tests.core.reconstruction.test_facets import arc, judged, rounded
 from tests.core.reconstruction.test_status import contours_of, cut_short, moved, waves
 
 
