@@ -46,11 +46,14 @@ class Border(NamedTuple):
     """Where a surface ends: segments (k, 2, 3), directions out of it there (k, 3), corners (n, 3).
 
     The directions, called ways, lie in the surface, across its border, and are of any length.
+
+    edge : that of the mesh from which a finger went on to it; patches end as far from it with any edge
     """
 
     segments: Array
     ways: Array
     corners: Array
+    edge: float
 
 
 def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, None, Border]:
@@ -59,7 +62,7 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
     near : the finger feels the surface at a place if it is within this length of that, along the normal
     """
     if mesh.is_closed:
-        return Border(np.zeros((0, 2, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
+        return Border(np.zeros((0, 2, 3)), np.zeros((0, 3)), np.zeros((0, 3)), 0.0)
     yield 0.0
     at, before, after, ways, normals = _rim_of(mesh)
     yield 0.0
@@ -86,7 +89,7 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
     c, one, two = corners[sharp], ways[before], ways[after]
     starts, ends = np.concatenate([a[~sharp], a[sharp], c]), np.concatenate([b[~sharp], c, b[sharp]])
     outward = np.concatenate([(one + two)[~sharp], one[sharp], two[sharp]])
-    return Border(np.stack([starts, ends], axis=1), outward, c)
+    return Border(np.stack([starts, ends], axis=1), outward, c, mesh.edge)
 
 
 def _above(
@@ -180,11 +183,11 @@ def snapped_to_border(mesh: Mesh, border: Border) -> Mesh:
     """
     if not len(border.segments):
         return mesh
-    edge = mesh.edge
+    edge, reach = mesh.edge, REACH * max(mesh.edge, border.edge)
     feet, ways = _feet(border, mesh.vertices)
     off = mesh.vertices - feet
     beyond, away = row_dot(off, ways), np.linalg.norm(off, axis=1)
-    out = (beyond > np.maximum(STRAIGHT * edge, ALONG * away)) & (away < REACH * edge)
+    out = (beyond > np.maximum(STRAIGHT * edge, ALONG * away)) & (away < reach)
     mesh = mesh.chosen(~out[mesh.triangles].any(axis=1))
     for _ in range(EARS):
         mesh = mesh.chosen(mesh.sides_on_border < 2)
@@ -193,19 +196,22 @@ def snapped_to_border(mesh: Mesh, border: Border) -> Mesh:
     at, _, _, toward, _ = _rim_of(mesh)
     vertices = mesh.vertices.copy()
     feet, ways = _feet(border, vertices[at])
-    # Where the mesh ends though the surface goes on, the way beyond is another.
-    on = (np.linalg.norm(feet - vertices[at], axis=1) < REACH * edge) & (row_dot(toward, ways) > ALONG)
+    # Where the mesh ends though the surface goes on, the way beyond is another; in front of a corner it is
+    # between those of both sides, and that of a zigzag is to one side of it.
+    on = (np.linalg.norm(feet - vertices[at], axis=1) < reach) & (row_dot(toward, ways) > 0.0)
     vertices[at[on]] = feet[on]
-    return _welded(_unfolded(_cornered(mesh._replace(vertices=vertices), border.corners), mesh))
+    snapped, fixed = _cornered(mesh._replace(vertices=vertices), border.corners, reach)
+    return _welded(_unfolded(snapped, mesh, fixed))
 
 
-def _unfolded(mesh: Mesh, before: Mesh) -> Mesh:
+def _unfolded(mesh: Mesh, before: Mesh, fixed: Indices) -> Mesh:
     """The mesh without triangles that turned over when vertices of its border moved.
 
-    Of such a triangle the ends of a side on the border meet in its middle, and the inner vertices move to the
-    means of their neighbors.
+    Of such a triangle the ends of a side on the border meet in its middle, or where one of them is fixed, and
+    the inner vertices move to the means of their neighbors.
 
     before : the same triangles before that
+    fixed : (n,), the vertices at corners, without which the border would not go there
     """
     across, vertices = triangle_cross(before.vertices[mesh.triangles]), mesh.vertices.copy()
     sides = mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
@@ -215,7 +221,9 @@ def _unfolded(mesh: Mesh, before: Mesh) -> Mesh:
     for _ in range(UNFOLDINGS):
         over = row_dot(triangle_cross(vertices[mesh.triangles]), across) < 0.0
         meeting = sides[on_border & over.repeat(3)]
-        vertices[meeting] = vertices[meeting].mean(axis=1, keepdims=True)
+        ends, stay = vertices[meeting], np.isin(meeting, fixed)[..., None]
+        places = np.where(stay[:, ::-1], ends[:, ::-1], ends.mean(axis=1, keepdims=True))
+        vertices[meeting] = np.where(stay, ends, places)
         some = np.unique(mesh.triangles[over])
         some = some[inner[some]]
         if not len(some):
@@ -240,16 +248,19 @@ def _welded(mesh: Mesh) -> Mesh:
     return mesh._replace(triangles=triangles).chosen(some)
 
 
-def _cornered(mesh: Mesh, corners: Array) -> Mesh:
-    """The mesh whose border has a vertex at corners (n, 3): the nearer end of the side that passes one by."""
+def _cornered(mesh: Mesh, corners: Array, reach: float) -> tuple[Mesh, Indices]:
+    """The mesh whose border has a vertex at corners (n, 3) within reach, and these vertices (k,).
+
+    It is the nearer end of the side that passes a corner by.
+    """
     sides, vertices, row = mesh.border, mesh.vertices.copy(), np.arange(len(corners))
     ends = vertices[sides]
     away = np.linalg.norm(corners[:, None, None] - ends, axis=3)
     best = np.argmin(away.sum(axis=2) - np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), axis=1)
     away, moved = away[row, best].min(axis=1), sides[best, away[row, best].argmin(axis=1)]
-    is_near = away < REACH * mesh.edge
+    is_near = away < reach
     vertices[moved[is_near]] = corners[is_near]
-    return mesh._replace(vertices=vertices)
+    return mesh._replace(vertices=vertices), moved[is_near]
 
 
 def _feet(border: Border, points: Array) -> tuple[Array, Array]:

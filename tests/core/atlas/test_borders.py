@@ -56,8 +56,8 @@ class Sheet:
         return None
 
 
-def turned():
-    axes, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
+def turned(seed=3):
+    axes, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     return axes * np.sign(np.linalg.det(axes))
 
 
@@ -105,6 +105,19 @@ def test_an_open_sheet_is_a_disc_that_ends_at_the_border_with_its_corners(polygo
         )
 
 
+@pytest.mark.parametrize(("polygon", "edges"), [(SQUARE, (0.007, 0.03)), (ANGLE, (0.01, 0.05))])
+def test_a_mesh_of_any_edge_has_all_corners_of_a_sheet_and_no_fold(polygon, edges):
+    """The only patch ends .11 before a corner."""
+    sheet = Sheet(polygon, turned(1))
+    atlas, corners = explored(sheet, (0.2, 0.15), np.array([0.0, 0.0, 1.0])), sheet.points(polygon)
+    assert atlas.status == "ok"
+    for mesh in (atlas.reference.mesh, *map(atlas.mesh, edges)):
+        assert np.linalg.norm(corners[:, None] - mesh.vertices, axis=2).min(axis=1).max() < TOLERANCE
+        assert (triangle_cross(mesh.vertices[mesh.triangles]) @ sheet.turn[:, 2] > -1e-15).all()
+        shape = solids.topology(mesh.triangles)
+        assert (shape.tangled, shape.euler, shape.pieces) == (0, 1, 1)
+
+
 @pytest.mark.long
 def test_beyond_the_border_the_deviation_is_infinite_and_inside_it_is_not():
     sheet = Sheet(ANGLE)
@@ -134,7 +147,7 @@ def test_a_mesh_that_is_too_wide_or_too_narrow_ends_at_the_border_and_does_not_f
         ends = np.stack([square, np.roll(square, -1, axis=0)], axis=1)
         ends = np.pad(ends, ((0, 0), (0, 0), (0, 1)))
         ways = np.array([(0, -1, 0), (1, 0, 0), (0, 1, 0), (-1, 0, 0)], dtype=float)
-        mesh = snapped_to_border(grid_mesh(), Border(ends, ways, ends[:, 0]))
+        mesh = snapped_to_border(grid_mesh(), Border(ends, ways, ends[:, 0], 0.0))
         a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
         areas = 0.5 * np.cross(b - a, c - a)[:, 2]
         assert areas.min() > -1e-12
@@ -149,8 +162,17 @@ def test_triangles_that_a_moved_border_turns_over_are_mended():
     vertices[-2:, 1] = vertices[[-1, -2], 1]  # Two vertices of the border pass each other.
     folded = mesh._replace(vertices=vertices)
     assert (triangle_cross(folded.vertices[folded.triangles])[:, 2] < 0.0).any()
-    found = _unfolded(folded, mesh)
+    found = _unfolded(folded, mesh, np.zeros(0, dtype=int))
     assert (triangle_cross(found.vertices[found.triangles])[:, 2] > -1e-15).all()
+
+
+def test_a_corner_stays_where_a_triangle_next_to_it_turned_over():
+    mesh = grid_mesh()
+    vertices = mesh.vertices.copy()
+    vertices[-2, 1] = 1.1  # Past the corner, which is the last vertex.
+    found = _unfolded(mesh._replace(vertices=vertices), mesh, np.array([len(vertices) - 1]))
+    assert (triangle_cross(found.vertices[found.triangles])[:, 2] > -1e-15).all()
+    assert found.vertices[[-2, -1]] == pytest.approx(mesh.vertices[[-1, -1]])
 
 
 def test_a_short_side_of_the_border_leaves_no_two_triangles_back_to_back():
@@ -167,7 +189,9 @@ def test_a_short_side_of_the_border_leaves_no_two_triangles_back_to_back():
 
 def test_a_mesh_without_a_border_stays():
     mesh = grid_mesh()
-    assert snapped_to_border(mesh, Border(np.zeros((0, 2, 3)), np.zeros((0, 3)), np.zeros((0, 3)))) is mesh
+    assert (
+        snapped_to_border(mesh, Border(np.zeros((0, 2, 3)), np.zeros((0, 3)), np.zeros((0, 3)), 0.0)) is mesh
+    )
 
 
 class Unreliable(Sheet):
