@@ -310,9 +310,9 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
 
     Also whether each of the first CHECKS / 2 must meet something there, (CHECKS / 2,), see STRAIGHT, and the
     length of all, which ends beyond the mesh. The first CHECKS are random: one half goes to middles of
-    triangles, the other to any place near the mesh. Others go to the SHARPEST vertices, whose triangles have
-    the least sum of angles there, to the UNSURE ones of the largest deviation, and straight down to triangles
-    around SPIKES of the sharpest.
+    triangles, the other to any place near the mesh. Others come straight down, as at a slant they would end
+    at the wall of a slot near its rim: to the SHARPEST vertices, whose triangles have the least sum of angles
+    there, to the UNSURE ones of the largest deviation, and to triangles around SPIKES of the sharpest.
     """
     rng, mesh = np.random.default_rng(0), reference.mesh
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
@@ -330,13 +330,11 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
     sharpest = np.argsort(np.where(reference.is_open, np.inf, reference.angles), kind="stable")[:SHARPEST]
     unsure = np.argsort(np.where(reference.is_open, 0.0, -mesh.std), kind="stable")[:UNSURE]
     some = np.append(sharpest, unsure)
-    up = away[: len(some)]
-    up = up * np.copysign(1.0, row_dot(up, mesh.normals[some]))[:, None]
     around = np.unique(reference.fans[sharpest[:SPIKES]])
     around = around[np.linalg.norm(reference.normals[around], axis=1) > STRAIGHT]  # The others have no area.
-    down = far * reference.normals[around]
-    starts = np.vstack([middle + away, mesh.vertices[some] + up, centers[around] + down])
-    return starts, np.vstack([aims, mesh.vertices[some], centers[around]]), facing, 3.0 * far
+    straight = np.vstack([mesh.vertices[some], centers[around]])
+    up = far * np.vstack([mesh.normals[some], reference.normals[around]])
+    return np.vstack([middle + away, straight + up]), np.vstack([aims, straight]), facing, 3.0 * far
 
 
 def _joined_and_refined(run: _Run) -> Steps:

@@ -173,13 +173,24 @@ def test_the_sharpest_places_are_checked_and_touched_again():
     assert np.linalg.norm(aims - starts, axis=1).max() < length
 
 
-def test_the_least_certain_vertex_is_checked(block):
-    """Patches that round an obtuse crease are off on a strip that random rays miss."""
+def test_a_ray_comes_straight_down_to_the_least_certain_vertex(block):
+    """Patches that round an obtuse crease are off on a strip that random rays miss, as they miss a slot."""
     mesh, vertex = block.reference.mesh, 1234
     std = mesh.std.copy()
     std[vertex] = 2.0 * std.max()
-    _, aims, _, _ = rays_at(replace(block.reference, mesh=mesh._replace(std=std)))
-    assert (aims[CHECKS:] == mesh.vertices[vertex]).all(axis=1).any()
+    starts, aims, _, _ = rays_at(replace(block.reference, mesh=mesh._replace(std=std)))
+    ray = CHECKS + np.flatnonzero((aims[CHECKS:] == mesh.vertices[vertex]).all(axis=1))[0]
+    up = starts[ray] - aims[ray]
+    assert up / np.linalg.norm(up) == pytest.approx(mesh.normals[vertex])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("depth", [0.2, 0.4])
+def test_a_slot_as_wide_as_the_tolerance_that_the_surface_bridges_is_not_ok(depth):
+    slotted = solids.slotted(0.05, depth)
+    atlas = core.explore_object(slotted, slotted.start, slotted.outward, tolerance=0.05, rng=0)
+    assert atlas.status == "uncertain"
+    assert "rays" in [doubt.code for doubt in atlas.doubts]
 
 
 def test_angles_around_a_vertex_are_those_of_its_triangles(block):
