@@ -202,11 +202,16 @@ def _without_outliers(of: _Turns, turns: Array) -> Array:
 
 
 def _counted(of: _Turns, turns: Array) -> tuple[Array, Array]:
-    """The sums (c,) of the absolute turns (m,) of curves, and how many bends (c,) these are."""
-    curve, number = of.curve, np.bincount(of.curve)
+    """The sums (c,) of the absolute turns (m,) of curves, and how many bends (c,) these are.
+
+    Without normals, a fold between two contacts turns chords at both, and is the sum of both turns.
+    """
+    curve, number, squared = of.curve, np.bincount(of.curve), turns**2
     length = np.maximum(np.bincount(curve, of.steps), SMALLEST)
     turned = np.asarray(np.bincount(curve, np.abs(turns)), dtype=float)
-    squares = np.bincount(curve, turns**2 / np.maximum(of.steps, (SHORT_STEP * length / number)[curve]))
+    if not of.is_felt:
+        squared[1:] += 2.0 * np.maximum(turns[1:] * turns[:-1], 0.0) * (curve[1:] == curve[:-1])
+    squares = np.bincount(curve, squared / np.maximum(of.steps, (SHORT_STEP * length / number)[curve]))
     bends: Array = np.where(
         turned > ROUNDED_TURN, number * turned**2 / np.maximum(length * squares, 1e-300), number
     )

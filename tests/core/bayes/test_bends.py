@@ -99,14 +99,15 @@ def test_an_automatic_touch_between_folds_stays_on_its_face(turn):
 
 @pytest.mark.parametrize("angle", [5, 10, 20])
 def test_without_normals_the_deviation_contains_the_curvature_of_folds(angle):
-    """A fold between two contacts is a bend of two chords, which few contacts show from a smooth curve."""
+    """A fold between two contacts turns two chords, and is one bend: folds are few, and a doubt if steep."""
     rng, sure = np.random.default_rng(angle), 0
     for r in touches(angle, 24, 1, extent=rng.uniform(0.4, 1.0)):
         bare = [replace(contour, normals=None) for contour in r.contours]
         found = core.reconstruct(r.point, bare, outward=(0.0, 0.0, 1.0))
-        assert not is_silent(found)
-        sure += found.status == "ok"
-    assert sure > 0
+        if found.status == "ok":
+            assert abs(found.k1) < 2.5 * found.k1_std
+            sure += 1
+    assert (sure > 0) is (angle < 20)
 
 
 @pytest.mark.parametrize("turn", [0, 15, 30, 45])
