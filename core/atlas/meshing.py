@@ -162,15 +162,14 @@ def meshed(
         normals = normalized(triangle_cross(surface.vertices[surface.triangles[beyond]]))
         steps = chunked(lambda *some: (felt(*some),), PLACES_AT_ONCE, 0.9, middles[beyond], normals)
         (off[beyond],) = yield from steps
-    most = max(span, indicator.cell)
-    is_unfelt = yield from _unfelt(surface, middles, np.isinf(off), ended, most)
+    span = max(span, indicator.cell)
+    is_unfelt = yield from _unfelt(surface, middles, np.isinf(off), ended, span)
     std = np.where(surface.patch < 0, indicator.cell, surface.std)
     if ended is None:
-        # Where no patch is, what is bridged may be anywhere within that. Beside one, where a finger met
-        # nothing within the tolerance, it is no more certain than that: rays that check it go there.
-        off[np.isinf(off) & (surface.patch[surface.triangles] >= 0).any(axis=1)] = span
+        # Where no patch is, what is bridged may be anywhere within the span.
+        off[np.isinf(off) & (surface.patch[surface.triangles] >= 0).any(axis=1)] = 0.0
         between = np.zeros(len(std))
-        np.maximum.at(between, surface.triangles.ravel(), np.minimum(off, most / np.sqrt(3.0)).repeat(3))
+        np.maximum.at(between, surface.triangles.ravel(), np.minimum(off, span / np.sqrt(3.0)).repeat(3))
         std = np.maximum(np.where(surface.patch < 0, 0.0, std), between)
     mesh = Mesh(surface.vertices, surface.triangles, std, surface.patch)
     return mesh.chosen(~is_unfelt), mesh.chosen(is_unfelt)

@@ -131,6 +131,7 @@ class _Run:
         least, rng = np.pi * (SMALL * tolerance) ** 2, generator_of(options.rng)
         self.frontier = Frontier(finger, NEAR * tolerance, least, options.noise, rng)
         self.found: list[Exploration] = []
+        self.void: list[Contact] = []  # Where the closed surface is, and the finger met nothing near it.
         self.done, self.is_stopped = 0, False
 
     def show(self, progress: Progress) -> Generator[Progress, object, None]:
@@ -233,7 +234,7 @@ class _Run:
 
     def check(self, reference: ReferenceMesh) -> Generator[float, None, Check]:
         """Contacts of a finger that comes from outside all round, and places of the mesh that it misses."""
-        starts, aims, facing, length = rays_at(reference)
+        starts, aims, facing, length = rays_at(reference, self.void)
         yield 1.0
         finger, ways = self.frontier.finger, normalized(aims - starts)
         met = [finger.met(vector_of(p), vector_of(way), length) for p, way in zip(starts, ways, strict=True)]
@@ -256,7 +257,7 @@ class _Run:
         something else, and where the surface is less certain than the tolerance.
         """
         charts = yield from part_of(self.joining(earlier), 0.0, 0.5)
-        patches = tuple(e.result for e in self.found)
+        patches, self.void = tuple(e.result for e in self.found), []
         reference = yield from part_of(joined_surface(patches, charts, self.tolerance, self.off), 0.5, 1.0)
         yield 1.0
         assert reference.unfelt is not None
@@ -288,6 +289,7 @@ class _Run:
         """
         places = [(vector_of(p), vector_of(n)) for p, n in zip(points, normals, strict=True)]
         contacts = [self.frontier.finger.near(*place, self.tolerance, FACING) for place in places]
+        self.void += [place for place, contact in zip(places, contacts, strict=True) if contact is None]
         return np.array([
             math.inf if contact is None else math.dist(place[0], contact[0])
             for place, contact in zip(places, contacts, strict=True)
@@ -305,14 +307,17 @@ class _Run:
         return self.frontier.felt_near(mesh.vertices[places], normals[places])
 
 
-def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], float]:
+def rays_at(
+    reference: ReferenceMesh, void: Sequence[Contact] = ()
+) -> tuple[Array, Array, NDArray[np.bool_], float]:
     """Rays that check a mesh from outside all round: their starts, and places that they go to, (k, 3).
 
     Also whether each of the first CHECKS / 2 must meet something there, (CHECKS / 2,), see STRAIGHT, and the
     length of all, which ends beyond the mesh. The first CHECKS are random: one half goes to middles of
     triangles, the other to any place near the mesh. Others come straight down, as at a slant they would end
     at the wall of a slot near its rim: to the SHARPEST vertices, whose triangles have the least sum of angles
-    there, to the UNSURE ones of the largest deviation, and to triangles around SPIKES of the sharpest.
+    there, to the UNSURE ones of the largest deviation, to triangles around SPIKES of the sharpest, and to as
+    many of the places `void`, where a finger met nothing near: there a slot may be bridged.
     """
     rng, mesh = np.random.default_rng(0), reference.mesh
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
@@ -332,8 +337,9 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
     some = np.append(sharpest, unsure)
     around = np.unique(reference.fans[sharpest[:SPIKES]])
     around = around[np.linalg.norm(reference.normals[around], axis=1) > STRAIGHT]  # The others have no area.
-    straight = np.vstack([mesh.vertices[some], centers[around]])
-    up = far * np.vstack([mesh.normals[some], reference.normals[around]])
+    bridged = np.array(void).reshape(-1, 2, 3)[rng.permutation(len(void))[:UNSURE]]
+    straight = np.vstack([mesh.vertices[some], centers[around], bridged[:, 0]])
+    up = far * np.vstack([mesh.normals[some], reference.normals[around], bridged[:, 1]])
     return np.vstack([middle + away, straight + up]), np.vstack([aims, straight]), facing, 3.0 * far
 
 

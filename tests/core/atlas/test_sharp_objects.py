@@ -184,10 +184,18 @@ def test_a_ray_comes_straight_down_to_the_least_certain_vertex(block):
     assert up / np.linalg.norm(up) == pytest.approx(mesh.normals[vertex])
 
 
+def test_a_ray_comes_straight_down_to_where_a_finger_met_nothing(block):
+    point, up = (0.1, 0.2, 0.3), (0.0, 0.6, 0.8)
+    starts, aims, _, length = rays_at(block.reference, [(point, up)])
+    assert tuple(aims[-1]) == point
+    assert (starts[-1] - aims[-1]) / np.linalg.norm(starts[-1] - aims[-1]) == pytest.approx(up)
+    assert np.linalg.norm(starts[-1] - aims[-1]) < length
+
+
 @pytest.mark.long
-@pytest.mark.parametrize("depth", [0.2, 0.4])
-def test_a_slot_as_wide_as_the_tolerance_that_the_surface_bridges_is_not_ok(depth):
-    slotted = solids.slotted(0.05, depth)
+@pytest.mark.parametrize(("width", "depth"), [(0.05, 0.2), (0.06, 0.4)])
+def test_a_slot_as_wide_as_the_tolerance_that_the_surface_bridges_is_not_ok(width, depth):
+    slotted = solids.slotted(width, depth)
     atlas = core.explore_object(slotted, slotted.start, slotted.outward, tolerance=0.05, rng=0)
     assert atlas.status == "uncertain"
     assert "rays" in [doubt.code for doubt in atlas.doubts]
