@@ -95,7 +95,7 @@ def exact(seed, noise, noise_is_given=True):
 
 
 def automatic(seed, noise):
-    """A surface of SURFACES and its fit, with an automatic extent."""
+    """A surface of SURFACES and its fit, with an automatic extent of at most one to three times the usual."""
     surface, extent = list(SURFACES.values())[seed % len(SURFACES)]
     rng = np.random.default_rng(seed)
     place = surface, surface.point, surface.normal, sampling(turn=rng.uniform(0.0, 180.0))

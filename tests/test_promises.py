@@ -13,7 +13,7 @@ import pytest
 from hypothesis import settings
 
 from core import verdict
-from core.atlas import curvature, expected, object_atlas, samples, touching
+from core.atlas import curvature, object_atlas, samples, touching
 from core.atlas import measured as atlas_measured
 from core.bayes import bends, evidence, joint_fit, kernel, posterior, prior, process_fit
 from core.contact_data import comments
@@ -80,6 +80,7 @@ PROMISES = [
     ("methods", "At most one in a hundred contacts is off it by more than five", 100 * explained.FEW),
     ("methods", "off it by more than five deviations", verdict.SIGNIFICANT / 5),
     ("methods", "at most # % of the radius in the mean", 100 * extent.TAPS_OFF),
+    ("methods", "are within three deviations of those", verdict.NOTICED / 3),
     ("methods", "left after five rounds", touching.AGAIN / 5),
     ("methods", "within # of the radius, a linear map", posterior.QUARTIC_SHARE),
     ("viewport", "*Ctrl* snaps angles to #°", math.degrees(of("tactile_addon/viewport/drag", "SNAP"))),
@@ -124,7 +125,6 @@ PROMISES = [
     ("stability", "is more than three times the stated one", of("benchmarks/stability", "TOO_FAR") / 3),
     ("stability", "the frame is off by more than #°", of("benchmarks/stability", "TURNED")),
     ("stability", "accurate to # % of the radius", 100 * of("benchmarks/stability", "SMALL")),
-    ("whole_objects", "from twelve touches made on the spot", expected.ROUNDS * expected.AT_ONCE / 12),
     ("whole_objects", "at least half of the area has the curvature of facets",
      2 * of("tactile_addon/whole_object/object_report", "FACETED")),
     ("whole_objects", "# % of the surface is within the tolerance",

@@ -28,7 +28,7 @@ FINEST, COARSEST = 1.0 / 400.0, 1.0 / 80.0  # Cells are between these shares of 
 TOLERANCES = 5.0  # A cell is at most this many tolerances.
 OPPOSITE = -0.9  # Two patches are the sides of a wall or gap if the cosine between their normals is less.
 THIN_SHARE = 0.003  # Walls are at least as thick as all but this share of the area is.
-INSIDE = 1e-5  # Rays across walls begin this share of the size below the surface.
+BELOW = 1e-5  # Rays across walls begin this share of the size below the surface.
 CERTAIN = 5.0  # Two sides that are nearer than this many deviations are no wall or gap.
 PATCHES_AT_ONCE = 20  # A step takes this many patches.
 
@@ -168,7 +168,7 @@ def thinnest_wall(surface: Surface, points: ArrayLike, outward: ArrayLike, size:
         raise ValueError("points: expected one or more, got none")
     inward = [unit_vector("outward", -up) for up in finite_array("outward", outward, p.shape, LARGEST)]
     size = number("size", size, above=0.0)
-    starts = p + INSIDE * size * np.array(inward)  # It is off the surface, which the ray would meet.
+    starts = p + BELOW * size * np.array(inward)  # It is off the surface, which the ray would meet.
     hits = [surface.ray_cast(vector_of(a), vector_of(b), size) for a, b in zip(starts, inward, strict=True)]
     thickness = [
         math.dist(hit[0], point) if hit is not None and np.dot(hit[1], way) > -OPPOSITE else math.inf
