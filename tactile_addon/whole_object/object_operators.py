@@ -45,7 +45,7 @@ ACCURACIES = [
     ("normal", "Normal", "A tolerance of 1/500 of the object's size"),
     ("fine", "Fine", "A tolerance of 1/1250 of the object's size: many touches"),
 ]
-# Before it begins, walls are measured at so many random places, and the first of these are touched.
+# Walls are measured at PLACES random places before it begins, and the first TRIED of these are touched.
 PLACES, TRIED, SEED = 600, 12, 0
 SEEN = 1.0  # The place is seen from so many sizes of the object, so that what is around it is seen, too.
 REACHED = 0.5  # A surface with less than this share of the largest deviation does not reach the object there.
