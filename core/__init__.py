@@ -32,7 +32,7 @@ from .contours.local_geometry import DegenerateCurvesError, Frame
 from .contours.tracking import track
 from .exploration.extent import Exploration
 from .exploration.options import ExplorationOptions
-from .exploration.taps import MeshError, doubts_by_mesh, mesh_error
+from .exploration.taps import tapped
 from .exploration.touches import explore, explore_many, exploring_many
 from .paper.by_method import SOLVERS
 from .patch.domain import Domain
@@ -68,7 +68,6 @@ __all__ = [
     "Frame",
     "Geometry",
     "Mesh",
-    "MeshError",
     "MongePatch",
     "NextTouch",
     "Pose",
@@ -88,13 +87,13 @@ __all__ = [
     "fit_error",
     "from_dict",
     "in_running_order",
-    "mesh_error",
     "reconstruct",
     "reconstruct_many",
     "register",
     "scattered",
     "spaced",
     "suggest_plane",
+    "tapped",
     "to_dict",
     "touch_all_over",
     "track",

@@ -126,11 +126,6 @@ REASONS = {
         "The contacts near the point bend otherwise than the patch, as beside a tip or a fold within it",
         (SHORTER, "move the point away from it"),
     ),
-    "mesh": Reason(
-        "The mesh is {percent:.3g} % of the radius off the patch on average, which expects up to "
-        "{percent_limit:.3g} %, so the curves miss something between them",
-        (SHORTER, PLANES),
-    ),
     # Measured contacts all around an object, and its surface.
     "opposed": Reason(
         "Normals contradict each other around {0}: strokes are too far apart there, or normals are wrong",

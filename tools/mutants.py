@@ -61,7 +61,7 @@ TESTS = {  # The tests of each module of core; those that fail soonest come firs
     "reconstruction/start": "reconstruction strokes",
     "reconstruction/status": "status",
     "reconstruction/strokes": "strokes order",
-    "exploration/taps": "mesh_error taps",
+    "exploration/taps": "taps_of_meshes taps",
     "scan/pose_search": "pose_search",
     "scan/sampling": "sampling pose_search",
     "scan/scanned_mesh": "pose_search",

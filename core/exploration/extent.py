@@ -215,7 +215,7 @@ class Touch:
         # A largest deviation judges the fit in place of shares of the radius.
         if r.taps is not None or self.options.largest_std is not None:
             return explored
-        judged = r.judged_with(taps=tapped(self.surface, r))
+        judged = r.judged_with(taps=tapped(r, self.surface))
         return replace(explored, result=with_facets(judged, self.surface))
 
     def _cut(self, step: float, extent: float, follow: Follow | None = None) -> list[Contour]:

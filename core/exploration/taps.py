@@ -3,7 +3,6 @@
 """Taps of the finger all over a patch: how far the surface is from it, and the patch's verdict from that."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,8 +11,7 @@ from ..contours.contour import Vector, along, dot, scaled, vector_of
 from ..contours.finger import Surface, contact_of
 from ..patch.domain import GAUSS_ALONG, Domain
 from ..reconstruction.result import Reconstruction
-from ..reconstruction.status import CONTRADICTING, DOUBTFUL_FIT, DOUBTFUL_GAP, Taps, useless
-from ..verdict import OK, Doubt, beyond
+from ..reconstruction.status import CONTRADICTING, DOUBTFUL_FIT, Taps
 
 # benchmarks.refusals of e20b52a counted the patches that are off, but ok.
 HAIR = 1e-4  # A ray continues this share of its reach behind each layer of the mesh.
@@ -25,17 +23,6 @@ NEAR_RIM = 0.98
 TOO_FAR_OFF = 10.0
 
 
-class MeshError(NamedTuple):
-    """How far a surface is off a patch, over the domain.
-
-    height : the mean distance in height where there is surface, or None if there is none
-    missing : the share of the area without surface within the radius, above or below
-    """
-
-    height: float | None
-    missing: float = 0.0
-
-
 def places(domain: Domain) -> Array:
     """Local places (n, 2) to tap: the Gauss points of the domain, and then those near its boundary."""
     nodes = domain.nodes[0]
@@ -43,45 +30,24 @@ def places(domain: Domain) -> Array:
     return np.concatenate([nodes, NEAR_RIM / domain.node_places[-1] * outermost])
 
 
-def tapped(surface: Surface, r: Reconstruction) -> Taps:
-    """Taps along the fit's normal between the curves. They have no noise: it would not change the verdict."""
-    feet, weighted = _on_patch(r, places(r.domain)), len(r.domain.nodes[1])
-    heights = heights_at(r, surface, feet)
-    met = ~np.isnan(heights)
-    off = np.abs(heights[met])
-    noise = max((contour.noise or 0.0 for contour in r.contours), default=0.0)
-    error = mean_error(r, heights[:weighted])
-    contradicts = (off > TOO_FAR_OFF * np.hypot(r.height_std(*feet[met, :2].T), noise)).any() or (
-        (error.height or 0.0) > CONTRADICTING * r.mean_height_std
-    )
-    most = float(off.max(initial=0.0)) / r.radius if contradicts else 0.0
-    return Taps(len(heights), int((~met).sum()), most, error.missing, error.height)
+def tapped(r: Reconstruction, surface: Surface) -> Taps:
+    """Taps along the fit's normal all over the patch; `Reconstruction.judged_with` makes the verdict of them.
 
-
-def mesh_error(r: Reconstruction, surface: Surface) -> MeshError:
-    """How far the surface is off the patch, by rays at the Gauss points of the domain."""
-    return mean_error(r, heights_at(r, surface, _on_patch(r, r.domain.nodes[0])))
-
-
-def mean_error(r: Reconstruction, heights: Array) -> MeshError:
-    """The error of the heights at the Gauss points of the domain, as `heights_at` has them."""
-    _, weights = r.domain.nodes
-    met = ~np.isnan(heights)
-    height = float(np.average(np.abs(heights[met]), weights=weights[met])) if met.any() else None
-    return MeshError(height, float(weights[~met].sum()))
-
-
-def _on_patch(r: Reconstruction, points: Array) -> Array:
-    """The local points (n, 3) of the patch at local places (n, 2)."""
-    return np.column_stack([points, r.height(*points.T)])
-
-
-def heights_at(r: Reconstruction, surface: Surface, feet: Array) -> Array:
-    """The height of the surface above local points (n, 3) of the patch; NaN where there is no surface."""
+    They have no noise: it would not change the verdict.
+    """
+    at, (_, weights) = places(r.domain), r.domain.nodes
+    starts = r.frame.to_world(np.column_stack([at, r.height(*at.T)])).tolist()
     up, side = vector_of(r.frame.axes[:, 2]), _side_of(r, surface)
-    starts = r.frame.to_world(feet).tolist()
-    heights = (layer_height(surface, vector_of(start), up, r.radius, side) for start in starts)
-    return np.array([math.nan if height is None else height for height in heights])
+    layers = [layer_height(surface, vector_of(start), up, r.radius, side) for start in starts]
+    heights = np.array([math.nan if height is None else height for height in layers])
+    off, met = np.abs(heights), ~np.isnan(heights)
+    felt = met[: len(weights)]
+    height = float(np.average(off[: len(weights)][felt], weights=weights[felt])) if felt.any() else None
+    noise = max((contour.noise or 0.0 for contour in r.contours), default=0.0)
+    stds = np.hypot(r.height_std(*at[met].T), noise)
+    contradicts = (off[met] > TOO_FAR_OFF * stds).any() or (height or 0.0) > CONTRADICTING * r.mean_height_std
+    most = float(off[met].max(initial=0.0)) / r.radius if contradicts else 0.0
+    return Taps(len(heights), int((~met).sum()), most, float(weights[~felt].sum()), height)
 
 
 def _side_of(r: Reconstruction, surface: Surface) -> float:
@@ -91,18 +57,6 @@ def _side_of(r: Reconstruction, surface: Surface) -> float:
     start = along(vector_of(r.frame.origin), up, reach)
     hit = surface.ray_cast(start, scaled(up, -1.0), 2.0 * reach)
     return 1.0 if hit is None else math.copysign(1.0, dot(contact_of(hit, 1.0)[1], up))
-
-
-def doubts_by_mesh(r: Reconstruction, error: MeshError) -> tuple[Doubt, ...]:
-    """The doubts of the fit or, if it has none, how the mesh contradicts it."""
-    mean, most = error.height or 0.0, CONTRADICTING * r.mean_height_std
-    if r.status != OK:
-        return r.doubts
-    tried = useless(r.method, r.contours, r.shape_curvatures)
-    return (
-        *beyond("gap", error.missing, DOUBTFUL_GAP, tried),
-        *beyond("mesh", mean / r.radius, most / r.radius, tried),
-    )
 
 
 def layer_height(

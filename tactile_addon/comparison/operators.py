@@ -81,13 +81,13 @@ class Verification:
         for found in core.verifying(r, self, np.vstack(seen)):
             self._found = found
             yield VERIFYING
-        # Of a coarse mesh few vertices are over the patch, or none.
-        self._error = core.mesh_error(r, self)
+        self._taps = core.tapped(r, self)
 
     def write(self) -> TouchReport:
         """Writes what was found to the patch: its deviations, and `verification` in its record."""
         (patch, _), r, surface = self._objects(), self._r, self._surface
         record = patch[patch_record.RECORD]
+        taps, is_own = self._taps, record["source"] == self.target
         # The object's mesh may have another scale than the patch.
         points = r.radius / record["radius"] * mesh_data.values(patch.data, mesh_data.POSITION)
         normals = r.geometry.normal(points[:, 0], points[:, 1]) @ r.frame.axes.T
@@ -97,17 +97,14 @@ class Verification:
         shown.recolor(patch)
         farthest = float(np.abs(deviations).max())
         record["verification"] = {"target": self.target, **self._found, "patch_distance_max": farthest}
-        if record["source"] == self.target:  # A touch compares with fewer of its vertices.
+        if is_own:  # A touch compares with fewer of its vertices.
             record.update({key: value for key, value in self._found.items() if key in VERTICES})
-        height = self._error.height
-        if height is not None:
-            record["height_error"] = height
+        if taps.height is not None:
+            record["height_error"] = taps.height
         if record["status"] != "outdated":
-            # A coarse mesh has few vertices over the patch, and these may be at its rim.
-            mean = self._found.get("vertex_distance_mean", 0.0) if height is None else height
             # Another mesh, as a scan, may show only a part of the object.
-            missing = self._error.missing if record["source"] == self.target else 0.0
-            record.update(judgment(r, core.MeshError(mean, missing), record["ended"]))
+            seen = taps if is_own else taps._replace(missed=0, missing=0.0)
+            record.update(judgment(r.judged_with(taps=seen), record["ended"]))
         return record.to_dict()
 
     def _objects(self) -> tuple[Object, Object]:

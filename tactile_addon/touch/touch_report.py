@@ -79,17 +79,17 @@ def ends(contours: Sequence[core.Contour], has_extent: bool) -> str:
     return f" {', '.join(words)}{', before the extent' if has_extent else ''}."
 
 
-def judgment(result: core.Reconstruction, error: core.MeshError, ended: str) -> TouchReport:
-    """The verdict, see core.doubts_by_mesh; `ended` is added to the fit's own message.
+def judgment(result: core.Reconstruction, ended: str) -> TouchReport:
+    """The verdict of a fit; `ended` is added to the fit's own message.
 
     On a crease or an edge a patch may fit one side. A stability map has none there, so it is in doubt.
     """
-    doubts, message = core.doubts_by_mesh(result, error), f"{result.message}{ended}"
+    doubts, message = result.doubts, f"{result.message}{ended}"
     if stops := core.stops_at(result.contours, result.frame.origin, AT_POINT * result.radius):
         where = core.WHERE[Counter(stops).most_common(1)[0][0]]
         doubts = (core.Doubt("at_edge", len(stops), words=(where,)), *doubts)
-    is_own = doubts[:1] == result.doubts[:1]
-    return verdict_report(doubts, message) | ({"message": message} if is_own else {})
+        message = str(doubts[0])
+    return verdict_report(doubts, message) | {"message": message}
 
 
 def verdict_report(doubts: Sequence[core.Doubt], message: str) -> TouchReport:
@@ -128,7 +128,7 @@ def reconstruction_report(result: core.Reconstruction, ended: str = "") -> Touch
     """The report of a fit before it is compared with a mesh; arguments as in `judgment`."""
     (d1, d2, n), at_point = result.frame.axes.T.tolist(), result.patch.derivatives(0.0, 0.0)
     return {
-        **judgment(result, core.MeshError(None), ended),
+        **judgment(result, ended),
         "ended": ended,
         "is_verified": False,
         "frame": {"origin": result.frame.origin.tolist(), "d1": d1, "d2": d2, "normal": n},

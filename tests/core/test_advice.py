@@ -159,15 +159,6 @@ def bend():
     ]
 
 
-def mesh():
-    """The fit does not know of the floor beside the curves."""
-    surface, found = Sector(-4.0, nearest=0.5), []
-    for extent in (FARTHEST, 0.4):
-        r = replace(explore(surface, extent=extent).result, taps=None)
-        found.append(core.doubts_by_mesh(r, core.mesh_error(r, surface)))
-    return found
-
-
 def opposed():
     points = np.vstack(rings_of_ball())
     normals = np.where((points[:, 2] > 0.8)[:, None], second(points, None), points)
@@ -254,7 +245,7 @@ OF_TOUCHES = {
     **{each.__name__.rstrip("_"): each for each in (facets, taps, near_edge, gap, condition, kink, point)},
     **{each.__name__.rstrip("_"): each for each in (normals, scattered_normals, contacts, heights)},
     **{each.__name__.rstrip("_"): each for each in (directions, curvatures, curve, waves_, flat_face)},
-    **{each.__name__.rstrip("_"): each for each in (folds, bend, mesh, steps)},
+    **{each.__name__.rstrip("_"): each for each in (folds, bend, steps)},
 }
 OF_OBJECTS = {
     each.__name__.rstrip("_"): each

@@ -12,7 +12,7 @@ from core import (
     Contour,
     SamplingPlane,
     explore,
-    mesh_error,
+    tapped,
     track,
     verify,
 )
@@ -353,7 +353,7 @@ def test_a_surface_of_single_precision_is_touched_in_double_precision():
         touch = explore(single, exact.point, exact.normal)
         r = touch.result
         vertices = r.frame.to_world(r.mesh()[0]).astype(np.float32)
-        off, report = mesh_error(r, single).height, verify(r, single, vertices)
+        off, report = tapped(r, single).height, verify(r, single, vertices)
     for contour, other in zip(contours, exact.track(PLANES, extent=10, step=0.5), strict=True):
         assert contour.points.dtype == contour.normals.dtype == np.float64
         assert contour.points == pytest.approx(other.points, abs=1e-5)

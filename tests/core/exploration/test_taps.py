@@ -164,11 +164,11 @@ def test_a_touch_is_in_doubt_where_the_surface_is_off_within_its_rim():
     pit = Sector(floor=-2.0, nearest=18.0, farthest=22.0)
     longest = core.explore(pit, (0.0, 0.0, 0.0), UP, extent=FARTHEST).result
     assert longest.status == "uncertain"
-    assert longest.taps.height == core.mesh_error(longest, pit).height > 3.0 * longest.mean_height_std
+    assert longest.taps.height == core.tapped(longest, pit).height > 3.0 * longest.mean_height_std
     shorter = explore(pit)
     assert (shorter.result.status, shorter.result.taps.off) == ("ok", 0.0)
     assert 0.25 * FARTHEST < shorter.extent < FARTHEST
-    assert core.mesh_error(shorter.result, pit).height < 1e-6
+    assert core.tapped(shorter.result, pit).height < 1e-6
 
 
 def test_a_small_hole_is_reported_and_is_no_doubt():
@@ -208,7 +208,7 @@ def test_where_taps_agree_nothing_changes(surface, noise, monkeypatch):
     other = core.explore(surface, surface.point, surface.normal, rng=generators[1], **given)
     assert one.result.status == "ok"
     assert one.result.taps[:4] == (96, 0, 0.0, 0.0)
-    assert one.result.taps.height == core.mesh_error(one.result, surface).height
+    assert one.result.taps.height == core.tapped(one.result, surface).height
     without = [json.dumps(core.to_dict(replace(r, taps=None))) for r in (one.result, other.result)]
     assert without[0] == without[1]
     assert generators[0].random() == generators[1].random()  # taps draw no noise

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a surface is off a patch all over it, and what that says of the fit."""
+"""Taps of a mesh all over a patch: how far it is off, and the verdict from that."""
 
 import math
 
@@ -10,7 +10,7 @@ import solids
 import surfaces
 
 import core
-from core.reconstruction.status import CONTRADICTING, DOUBTFUL_GAP
+from core.reconstruction.status import CONTRADICTING, DOUBTFUL_GAP, Taps
 
 
 class Levels:
@@ -39,7 +39,7 @@ def flat():
 
 @pytest.mark.parametrize("level", [0.3, -0.3, 0.0])
 def test_a_plane_that_is_off_has_the_exact_distance(flat, level):
-    assert core.mesh_error(flat, Levels((level, 1.0))).height == pytest.approx(abs(level), abs=1e-6)
+    assert core.tapped(flat, Levels((level, 1.0))).height == pytest.approx(abs(level), abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -54,7 +54,7 @@ def test_a_plane_that_is_off_has_the_exact_distance(flat, level):
     ],
 )
 def test_the_nearest_layer_whose_outside_is_up_counts(flat, levels, off):
-    found = core.mesh_error(flat, Levels(*levels)).height
+    found = core.tapped(flat, Levels(*levels)).height
     assert found is None if off is None else found == pytest.approx(off, abs=1e-6)
 
 
@@ -83,7 +83,7 @@ class Facing:
 )
 def test_normals_that_face_the_ray_tell_the_same_distance(flat, levels, off):
     for surface in (Levels(*levels), Facing(Levels(*levels))):
-        found = core.mesh_error(flat, surface).height
+        found = core.tapped(flat, surface).height
         assert found is None if off is None else found == pytest.approx(off, abs=1e-6)
 
 
@@ -165,17 +165,17 @@ class HalfPlane(Levels):
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize(("start", "share"), [(-2.0, 0.0), (-0.5, 0.196), (-0.9, 0.019)])
 def test_the_area_without_surface_is_missing(flat, start, share, side):
-    found = core.mesh_error(flat, HalfPlane(start, side))
+    found = core.tapped(flat, HalfPlane(start, side))
     assert found.height == pytest.approx(0.0, abs=1e-6)
     assert found.missing == pytest.approx(share, abs=0.03)
 
 
 def test_a_patch_is_in_doubt_where_there_is_no_mesh(flat):
-    assert core.doubts_by_mesh(flat, core.MeshError(0.0, DOUBTFUL_GAP)) == ()
-    error = core.mesh_error(flat, HalfPlane(-0.5))
-    (doubt,) = core.doubts_by_mesh(flat, error)
+    assert flat.judged_with(taps=Taps(96, missing=DOUBTFUL_GAP)).doubts == ()
+    taps = core.tapped(flat, HalfPlane(-0.5))
+    (doubt,) = flat.judged_with(taps=taps).doubts
     assert str(doubt) == (
-        f"At {100.0 * error.missing:.0f} % of the patch there is no surface, which ends or has a hole "
+        f"At {100.0 * taps.missing:.0f} % of the patch there is no surface, which ends or has a hole "
         "between the curves: use a shorter extent or add sampling planes."
     )
 
@@ -183,19 +183,20 @@ def test_a_patch_is_in_doubt_where_there_is_no_mesh(flat):
 def test_it_is_the_mean_over_the_domain_of_what_the_fit_misses():
     s = surfaces.pear()
     r = s.fit(s.track(surfaces.planes((0, 60, 120))))
-    found = core.mesh_error(r, s).height
+    found = core.tapped(r, s).height
     assert 0.3 * r.mean_height_std < found < 2.0 * r.mean_height_std
     larger = r.moved(
         np.diag([1.0, 1.0, 1.0, 1.0]) + 0.1 * r.radius * np.outer([*r.frame.axes[:, 2], 0], [0, 0, 0, 1])
     )
-    assert core.mesh_error(larger, s).height == pytest.approx(0.1 * r.radius, rel=0.1)
+    assert core.tapped(larger, s).height == pytest.approx(0.1 * r.radius, rel=0.1)
 
 
 def test_a_mesh_contradicts_a_fit_without_doubt_where_it_is_beyond_its_deviation(flat):
     std = flat.mean_height_std
-    assert core.doubts_by_mesh(flat, core.MeshError(CONTRADICTING * std)) == ()
-    (doubt,) = core.doubts_by_mesh(flat, core.MeshError(1.01 * CONTRADICTING * std))
+    assert core.tapped(flat, Levels((0.99 * CONTRADICTING * std, 1.0))).off == 0.0
+    taps = core.tapped(flat, Levels((1.01 * CONTRADICTING * std, 1.0)))
+    assert taps.off == pytest.approx(1.01 * CONTRADICTING * std)
+    (doubt,) = flat.judged_with(taps=taps).doubts
     assert (flat.status, core.status_of(doubt)) == ("ok", "uncertain")
-    assert str(doubt).startswith("The mesh is ") and str(doubt).endswith(
-        "use a shorter extent or add sampling planes."
-    )
+    assert str(doubt).startswith("Between the curves the surface is up to ")
+    assert str(doubt).endswith("use a shorter extent or add sampling planes.")
