@@ -30,8 +30,6 @@ STRAIGHT = 0.1  # if it is straight on both sides to this share of an edge.
 INWARD = 0.1  # Corners are felt this share of the way from there to the middle of the chord across them.
 SMOOTHINGS = 3  # This often directions of a border become the means of their neighbors'.
 UNFOLDINGS = 8  # Triangles that turn over are mended this often; nearly all are after one (test_borders).
-EARS = 2  # This often triangles with two sides on the border are left out.
-ALONG = 0.5  # Ways agree if the cosine of the angle between them is more.
 NEAREST = 12  # The nearest segment is one of this many whose middles are nearest.
 # Sides of the border below this share of an edge are one place: with 1e-6 the triangle of one turns over at a
 SHORT = 0.01  # notch of an open sheet under SkylakeX (test_borders).
@@ -179,18 +177,19 @@ def _corners(places: Array, before: Indices, after: Indices, edge: float) -> tup
 def snapped_to_border(mesh: Mesh, border: Border) -> Mesh:
     """The mesh with the vertices of its border on that of the surface.
 
-    What is beyond that is left out first, so that vertices only move outward and no triangle folds over.
+    Triangles whose middles are beyond that are left out first, and those that jut out. Without all that have
+    a vertex beyond it the tip of a narrow corner would hang by a single vertex, and its corner would be lost.
     """
     if not len(border.segments):
         return mesh
-    edge, reach = mesh.edge, REACH * max(mesh.edge, border.edge)
-    feet, ways = _feet(border, mesh.vertices)
-    off = mesh.vertices - feet
-    beyond, away = row_dot(off, ways), np.linalg.norm(off, axis=1)
-    out = (beyond > np.maximum(STRAIGHT * edge, ALONG * away)) & (away < reach)
-    mesh = mesh.chosen(~out[mesh.triangles].any(axis=1))
-    for _ in range(EARS):
-        mesh = mesh.chosen(mesh.sides_on_border < 2)
+    reach = REACH * max(mesh.edge, border.edge)
+    middles = mesh.vertices[mesh.triangles].mean(axis=1)
+    feet, ways = _feet(border, middles)
+    off = middles - feet
+    out = (row_dot(off, ways) > 0.0) & (np.linalg.norm(off, axis=1) < reach)
+    mesh = mesh.chosen(~out)
+    while (ears := mesh.sides_on_border > 1).any():
+        mesh = mesh.chosen(~ears)
     if not len(mesh.border):  # Nothing is left of a small mesh.
         return mesh
     at, _, _, toward, _ = _rim_of(mesh)

@@ -16,6 +16,8 @@ from tests import solids
 TOLERANCE = 2e-3
 ANGLE = np.array([(0, 0), (1, 0), (1, 0.4), (0.4, 0.4), (0.4, 1), (0, 1)])  # An L.
 SQUARE = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
+RADII, AROUND = np.tile([0.5, 0.2], 5), np.arange(10) * np.pi / 5.0
+STAR = 0.5 + np.stack([RADII * np.cos(AROUND), RADII * np.sin(AROUND)], axis=1)  # Its tips have 36 degrees.
 
 
 class Sheet:
@@ -105,11 +107,18 @@ def test_an_open_sheet_is_a_disc_that_ends_at_the_border_with_its_corners(polygo
         )
 
 
-@pytest.mark.parametrize(("polygon", "edges"), [(SQUARE, (0.007, 0.03)), (ANGLE, (0.01, 0.05))])
-def test_a_mesh_of_any_edge_has_all_corners_of_a_sheet_and_no_fold(polygon, edges):
-    """The only patch ends .11 before a corner."""
+@pytest.mark.parametrize(
+    ("polygon", "start", "edges"),
+    [
+        (SQUARE, (0.2, 0.15), (0.007, 0.03)),
+        (ANGLE, (0.2, 0.15), (0.01, 0.05)),
+        (STAR, (0.5, 0.5), (0.015, 0.04)),
+    ],
+)
+def test_a_mesh_of_any_edge_has_all_corners_of_a_sheet_and_no_fold(polygon, start, edges):
+    """The only patch of the first two ends .11 before a corner; tips of the star are an edge wide."""
     sheet = Sheet(polygon, turned(1))
-    atlas, corners = explored(sheet, (0.2, 0.15), np.array([0.0, 0.0, 1.0])), sheet.points(polygon)
+    atlas, corners = explored(sheet, start, np.array([0.0, 0.0, 1.0])), sheet.points(polygon)
     assert atlas.status == "ok"
     for mesh in (atlas.reference.mesh, *map(atlas.mesh, edges)):
         assert np.linalg.norm(corners[:, None] - mesh.vertices, axis=2).min(axis=1).max() < TOLERANCE
