@@ -9,7 +9,7 @@ docs/messages.md of them.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -21,6 +21,7 @@ SIGNIFICANT = 5.0  # Noise does not explain what is off by more standard deviati
 OK, UNCERTAIN, NOT_CONVERGED = "ok", "uncertain", "not_converged"  # Each status.
 
 SHORTER, LONGER, PLANES = "use a shorter extent", "use a longer extent", "add sampling planes"
+OPPOSITE = {SHORTER: LONGER, LONGER: SHORTER}
 FROM_EDGE = "move the point away from the edge"
 FINER_FACETS = "make the facets finer"
 SUBDIVIDE = "add a Subdivision modifier if the shape is smooth"
@@ -241,9 +242,14 @@ class Doubt:
         )
 
     @property
+    def helpful(self) -> list[str]:
+        """What helps, the best first."""
+        return [one for one in REASONS[self.code].advice if one not in self.useless]
+
+    @property
     def advice(self) -> str:
         """What helps, as words that follow a colon."""
-        return joined([one for one in REASONS[self.code].advice if one not in self.useless])
+        return joined(self.helpful)
 
     def __str__(self) -> str:
         return f"{self.sentence}: {self.advice}."
@@ -289,8 +295,12 @@ class Judged(ABC):
 
     @cached_property
     def doubts(self) -> tuple[Doubt, ...]:
-        """All reasons to doubt it, the gravest first."""
-        return tuple(self._doubting())
+        """All reasons to doubt it, the gravest first; none advises the opposite of a graver one."""
+        found: list[Doubt] = []
+        for doubt in self._doubting():
+            opposed = [OPPOSITE[one] for graver in found for one in graver.helpful if one in OPPOSITE]
+            found.append(replace(doubt, useless=(*doubt.useless, *opposed)))
+        return tuple(found)
 
     @cached_property
     def gravest(self) -> Doubt | None:

@@ -13,6 +13,7 @@ from core import METHODS, Contour, DegenerateCurvesError, reconstruct
 from core.bayes.posterior import SurfacePosterior
 from core.contours.contour import UNEXPLAINED
 from core.contours.curves import curves_through, misses, stacked
+from core.verdict import LONGER, PLANES, SHORTER, Doubt, Judged
 
 EXTENT = 12.0
 
@@ -406,3 +407,15 @@ def test_outlying_contacts_are_no_waves():
             points[:, 2] += np.where(rng.random(len(points)) < 0.2, rng.normal(0.0, 1.2, len(points)), 0.0)
             found.append(Contour(points, noise=0.05))
         assert "Waves" not in surface.fit(found).message
+
+
+@pytest.mark.parametrize("useless", [(), (SHORTER,)], ids=["given", "automatic"])
+def test_no_doubt_advises_the_opposite_of_a_graver_one(useless):
+    class Doubtful(Judged):
+        def _doubting(self):
+            yield Doubt("heights", 0.05, 0.02, useless=useless)
+            yield Doubt("curvatures", 0.3, 0.1, useless=(SHORTER,))
+
+    heights, curvatures = Doubtful().doubts
+    assert (SHORTER in heights.advice) is not (LONGER in curvatures.advice)
+    assert PLANES in curvatures.advice
