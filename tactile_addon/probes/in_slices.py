@@ -3,6 +3,7 @@
 """Long work that is done in slices between a window's events, with progress and Esc."""
 
 import sys
+import textwrap
 from collections.abc import Callable, Iterator
 from time import perf_counter
 from typing import Any, TypeAlias
@@ -22,6 +23,7 @@ FIRST_SLICE = 0.2  # Work that takes no longer is done without slices.
 TIMER_SLICE, LONGEST_SLICE = 0.03, 0.25  # The least and longest work between two events: as a redraw takes.
 NEXT = 0.01  # The next slice begins after this time.
 LITTLE = 0.05  # The time that is left is said from this share on.
+LETTERS = 44  # About how many letters fit into a line of a dialog.
 SAY = 1.0  # Without a window, a line of progress is printed each time.
 Progress: TypeAlias = tuple[str, float | None]  # Words, and the share that is done, if it is known.
 
@@ -249,4 +251,5 @@ class AllOver(InSlices):
             words = self._about(context)
         except ValueError as error:
             words = sentence(error)
-        self.layout.label(text=words, translate=False)
+        for line in textwrap.wrap(words, LETTERS):
+            self.layout.label(text=line, translate=False)
