@@ -220,9 +220,8 @@ def require_fine(spacing: float, step: float) -> None:
     if spacing > STEP_ROUNDING * step:
         raise ValueError(
             f"Neighboring coordinates at the point are {length(spacing)} apart in single precision, "
-            "too coarse "
-            f"for a step of {length(step)}: move the object nearer to the origin of the world or of its own "
-            "mesh"
+            f"too coarse for a step of {length(step)}: use a longer extent or step, or move the object "
+            "nearer to the origin of the world or of its own mesh"
         )
 
 
