@@ -25,7 +25,7 @@ from ..scene import patch_object
 from ..touch.settings import FitSettings, draw_fit, given, length_property
 from ..touch.types import Outcome
 from ..touch.units import length
-from ..touch.wording import fit_summary
+from ..touch.wording import verdict
 from ..whole_object import whole_mesh
 from ..whole_object.object_report import object_summary
 from . import measured
@@ -148,7 +148,7 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
             solver=self.solver,
         )
         make_active(context, patch_object.insert(context.scene, touched))
-        report, summary = touched.report, fit_summary(touched.report)
+        report, summary = touched.report, verdict(touched.report)
         if "misses" in report:
             summary += f"; curves miss their common point by {length(max(report['misses']))} at most"
         return report_done(self, summary, report["status"] == "ok")

@@ -13,7 +13,7 @@ from ..scene import patch_object, patch_record
 from ..touch.settings import UNSAVED, PlacedTouch, draw_all, given, length_property, touch_arguments
 from ..touch.touch_object import completed, touch
 from ..touch.types import Object, Outcome
-from ..touch.wording import fit_summary, sentence
+from ..touch.wording import sentence, verdict
 from .probe import is_result, lock_of, probe_of, record_of
 
 CONVERTIBLE = {"FONT": "text", "CURVE": "curve", "SURFACE": "surface", "META": "metaball"}
@@ -70,7 +70,7 @@ class TACTILE_OT_reconstruct(PlacedTouch, bpy.types.Operator):
             )
         touched = completed(touched)
         make_active(context, patch_object.insert(context.scene, touched))
-        return report_done(self, fit_summary(touched.report), touched.report["status"] == "ok")
+        return report_done(self, verdict(touched.report), touched.report["status"] == "ok")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -68,10 +68,17 @@ def verdict(report: TouchReport) -> str:
         return "Outdated: touch again"
     if report["doubts"]:
         return f"Doubtful: {report['doubts'][0]['advice']}"
-    height, least = say_of(report, report["height_std"]), UNCERTAIN / report["radius"]
-    if any(report[f"{key}_std"] > max(abs(report[key]), least) for key in ("k1", "k2")):
+    height = say_of(report, report["height_std"])
+    if _is_uncertain(report):
         return f"Good heights, to ± {height}; curvatures are uncertain"
     return f"Good: heights to ± {height}"
+
+
+def _is_uncertain(report: Mapping[str, Any]) -> bool:
+    """Whether the deviation of a principal curvature leaves nothing of it."""
+    return any(
+        report[f"{key}_std"] > max(abs(report[key]), UNCERTAIN / report["radius"]) for key in ("k1", "k2")
+    )
 
 
 def reasons(report: Mapping[str, Any]) -> list[str]:
@@ -134,16 +141,10 @@ def sentence(error: Exception) -> str:
     return words[:1].upper() + words[1:]
 
 
-def fit_summary(report: TouchReport) -> str:
-    """A sentence on a fit: the verdict on it, and the curvatures."""
-    return f"{verdict(report)}. Curvatures {curvatures(report)}"
-
-
 def curvatures(report: Mapping[str, Any]) -> str:
-    """Both principal curvatures in words, without their standard deviations, such as "-2 and 0.5 1/m"."""
+    """Both principal curvatures, such as "-2 and 0.5 1/m", or that they are not certain."""
     first, second = (say_of(report, known(report[key], report[f"{key}_std"]), -1) for key in ("k1", "k2"))
-    shared = second.partition(" ")[2]
-    return f"{first.removesuffix(f' {shared}')} and {second}"
+    return "not certain" if _is_uncertain(report) else f"{first.partition(' ')[0]} and {second}"
 
 
 def _verification(report: TouchReport) -> str:

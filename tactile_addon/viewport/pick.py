@@ -217,9 +217,8 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
                 active = context.view_layer.objects.active
                 if (patch_record.touched_record(active) or {}).get("source") == obj.name:
                     location = touched_near(active, location)
-                depsgraph = context.evaluated_depsgraph_get()
-                touched = touch(obj, depsgraph, location, toward=eye, **touch_arguments(self))
-                self._seen["touched"] = touched
+                depsgraph, arguments = context.evaluated_depsgraph_get(), touch_arguments(self)
+                self._seen["touched"] = touched = touch(obj, depsgraph, location, toward=eye, **arguments)
                 is_sure = touched.report["status"] == "ok"
                 bends = f"principal curvatures {curvatures(touched.report)}"
                 words = short = f"{obj.name}: {bends if is_sure else verdict(touched.report)}"

@@ -85,6 +85,7 @@ def test_a_good_verdict_says_where_curvatures_are_uncertain(wording, more, is_un
     said = wording.verdict(record(**more))
     good = "Good: heights to ± 0.0123 mm"
     assert said == ("Good heights, to ± 0.0123 mm; curvatures are uncertain" if is_uncertain else good)
+    assert (wording.curvatures(record(**more)) == "not certain") is is_uncertain
 
 
 def test_a_flat_patch_has_no_shape_index(wording, empty):
