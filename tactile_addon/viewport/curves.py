@@ -87,8 +87,8 @@ def draw(curves: Curves, rim: tuple[float, ...], has_contours: bool, has_directi
     lines: list[tuple[Sequence[float], tuple[float, ...]]] = []
     if has_contours:
         lines = [(path, rim) for path in curves["rim"]]
-        pairs = zip(curves["contours"], cycle(PLANE_COLORS), strict=False)
-        lines += [(path, (*color, 1.0)) for path, color in pairs]
+        colors = ((*color, 1.0) for color in cycle(PLANE_COLORS))
+        lines += zip(curves["contours"], colors, strict=False)
     if has_directions:
         lines += [(path, BLACK) for path in curves.get("directions", ())]
     draw_lines(lines)

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The handles of the active probe: they move its point, turn and tilt sampling planes, and set the extent."""
 
+import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import bpy
@@ -20,8 +22,9 @@ from .free_view import is_free
 from .mouse import line_of_sight
 
 # Handles that turn planes are on the ends of their curves, and those that tilt planes this many extents above
-# the point, or at the first place where the view is free: at the other end, or nearer.
+# the point, or at the first place where the view is free: at the curve's other end, or nearer.
 UPRIGHT, UPRIGHT_PLACES = 0.75, 10
+OFF = 0.05  # The target hides what is behind it by more than this share of the extent.
 MARGIN = 10.0  # The radius of a handle in pixels at scale 1; handles do not overlap.
 BALL, LEAST_BALL = 0.12, 0.05  # Sizes of balls, in units of Blender's gizmo size.
 SHARE = 0.125  # A ball is no larger than this share of the patch in the view.
@@ -90,41 +93,52 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         settings, matrix = obj.tactile_probe, obj.matrix_world
         reach = settings.extent or probe.record_of(obj)["extent"]
         center = matrix.translation
-        self._shrink(context, center, reach)
+        to_world: Any = context.region_data.view_matrix.inverted_safe()
+        seen = _apart(context, center, center + reach * to_world.col[0].xyz)
+        size = min(max(SHARE * seen / context.preferences.view.gizmo_size, LEAST_BALL), BALL)
+        for ball in (self.point, *self.turns, *self.tilts):  # So they do not hide a patch that is small.
+            ball.scale_basis, ball.hide = size, ball != self.point
         active = min(settings.active_plane, settings.plane_count - 1)
         self.point.matrix_basis = Matrix.Translation(center)
-        self.point.hide = settings.target is None
+        self._is_hidden = partial(_is_hidden, context, settings.target, OFF * reach)
+        self.point.hide = settings.target is None or self._is_hidden(center)
         patch = probe.patch_of(obj)
-        paths = patch[CURVES]["contours"]
-        lines = [[patch.matrix_world @ Vector(p) for p in np.reshape(path, (-1, 3))] for path in paths]
-        handles = list(zip(self.turns[: settings.plane_count], lines, strict=False))
+        lines = [
+            [patch.matrix_world @ Vector(place) for place in np.reshape(path, (-1, 3))]
+            for path in patch[CURVES]["contours"]
+        ]
+        handles = [
+            (turn, [place for pair in zip(reversed(line), line, strict=True) for place in pair][: len(line)])
+            for turn, line in zip(self.turns[: settings.plane_count], lines, strict=False)
+        ]
         t, up = (Vector(axis) for axis in plane_axes(matrix, settings, active).T.tolist()[:2])
         # If the tilt's plane is seen edge on, a little way of the mouse turns it by much.
         if abs(line_of_sight(context.region_data, center).dot(t)) >= STEEP:
-            shares = np.linspace(-UPRIGHT, UPRIGHT, 2 * UPRIGHT_PLACES).tolist()
+            shares = np.linspace(UPRIGHT, 0.0, UPRIGHT_PLACES, endpoint=False).tolist()
             handles.append((self.tilts[active], [center + share * reach * up for share in shares]))
-        for each in (*self.turns, *self.tilts):
-            each.hide = True
         taken: list[Any] = []
-        for each, line in handles:
-            self._put(context, each, line, taken)
-            each.hide = not _are_apart(context, center, each.matrix_basis.translation)
-        self.extent.hide = not _are_apart(context, center, center + reach * _right(context))
+        for each, places in handles:
+            place = self._put(context, each, places, taken)
+            each.hide = self._is_hidden(place) or _apart(context, center, place) < APART
+        self.extent.hide = self.point.hide or seen < APART
         self.extent.rim = list(patch[CURVES]["rim"][0])  # Another touch frees the patch's own.
         self.extent.matrix_basis = drawn_at(context.space_data, patch)
 
-    def _put(self, context: bpy.types.Context, handle: Any, line: list[Any], taken: list[Any]) -> None:
-        """Puts a handle on a line, as far out as the view is free, or if it is nowhere, on its end.
+    def _put(self, context: bpy.types.Context, handle: Any, places: list[Any], taken: list[Any]) -> Any:
+        """Puts a handle on the first of these places where the view is free, or else on the first one.
 
         taken : where the handles are that were put before, in the region; this one is added
+
+        Returns the place.
         """
-        places = [place for pair in zip(reversed(line), line, strict=True) for place in pair][: len(line)]
         margin = MARGIN * context.preferences.system.ui_scale
 
         def is_good(end: int) -> bool:
             at = _seen(context, places[end])
-            return is_free(context, at, 2.5 * margin) and all(
-                (at - other).length > 2.0 * margin for other in taken
+            return (
+                is_free(context, at, 2.5 * margin)
+                and all((at - other).length > 2.0 * margin for other in taken)
+                and not self._is_hidden(places[end])
             )
 
         if not handle.is_modal:  # One that is dragged stays at its end.
@@ -132,16 +146,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         place = places[min(self.ends[handle], len(places) - 1)]
         handle.matrix_basis = Matrix.Translation(place)
         taken += filter(None, [_seen(context, place)])
-
-    def _shrink(self, context: bpy.types.Context, center: Vector, reach: float) -> None:
-        """Makes the balls smaller if the patch is small in the view, so that they do not hide it."""
-        here, there = _seen(context, center), _seen(context, center + reach * _right(context))
-        if here is None or there is None:
-            return
-        gizmo = context.preferences.view.gizmo_size * context.preferences.system.ui_scale
-        scale = min(max(SHARE * (there - here).length / gizmo, LEAST_BALL), BALL)
-        for ball in (self.point, *self.turns, *self.tilts):
-            ball.scale_basis = scale
+        return place
 
 
 def _seen(context: bpy.types.Context, place: Vector) -> Any:
@@ -149,14 +154,23 @@ def _seen(context: bpy.types.Context, place: Vector) -> Any:
     return location_3d_to_region_2d(context.region, context.region_data, place)
 
 
-def _are_apart(context: bpy.types.Context, place: Vector, other: Vector) -> bool:
-    """Whether two places of the world are not close to each other in the region, if both are there."""
+def _is_hidden(context: Any, target: Any, off: float, place: Vector) -> bool:
+    """Whether a place of the world is behind a mesh in the view, by more than this length."""
+    space, view = context.space_data, context.region_data
+    is_clear = space.shading.type == "WIREFRAME" or space.shading.show_xray
+    if target is None or is_clear or not target.visible_in_viewport_get(space):
+        return False
+    shown, sight = target.evaluated_get(context.evaluated_depsgraph_get()), line_of_sight(view, place)
+    eye = (
+        view.view_matrix.inverted_safe().translation
+        if view.is_perspective
+        else place - space.clip_end * sight
+    )
+    start, end = (shown.matrix_world.inverted_safe() @ at for at in (place - off * sight, eye))
+    return bool(shown.ray_cast(start, end - start, distance=(end - start).length)[0])
+
+
+def _apart(context: bpy.types.Context, place: Vector, other: Vector) -> float:
+    """The pixels at scale 1 between two places of the world in the region, or inf if one is not there."""
     here, there = _seen(context, place), _seen(context, other)
-    near = APART * context.preferences.system.ui_scale
-    return here is None or there is None or (there - here).length >= near
-
-
-def _right(context: bpy.types.Context) -> Vector:
-    """The direction to the right in the view."""
-    to_world: Any = context.region_data.view_matrix.inverted_safe()
-    return to_world.col[0].xyz.normalized()
+    return math.inf if None in (here, there) else (there - here).length / context.preferences.system.ui_scale

@@ -140,10 +140,13 @@ def drag_handles():
     gui.find()[1].spaces.active.region_3d.view_rotation = probe().matrix_world.to_quaternion() @ Quaternion(
         (1.0, 0.0, 0.0), math.radians(90.0)
     )
+    shading = gui.find()[1].spaces.active.shading
+    shading.type = "WIREFRAME"  # The mesh hides the handle otherwise.
     yield 0.5
     gui.drag(handle(azimuth), [v + 20 for v in handle(azimuth)])
     yield 1
     yield from until(is_complete)
+    shading.type = "SOLID"
     check("a handle in a plane seen edge on stays where it is", same(state(), before), (state(), before))
     gui.find()[1].spaces.active.region_3d.view_rotation = direction
     yield 0.5
@@ -478,11 +481,12 @@ def grab_from_near():
     bpy.ops.tactile.pick(target="Cube", location=(0, -1, 0), new=True)
     owner, groups = bpy.context.object, bpy.types.GizmoGroup.__subclasses__()
     group = next(group for group in groups if group.__name__ == "TACTILE_GGT_handles")
-    places, prepare = [], group.draw_prepare
+    places, hidden, prepare = [], [], group.draw_prepare
 
     def noted(self, context):
         prepare(self, context)
         places[:] = [turn.matrix_basis.translation.copy() for turn in self.turns]
+        hidden[:] = [each.hide for each in (self.point, self.extent, *self.turns[:3], *self.tilts[:3])]
 
     group.draw_prepare = noted
     _, area, region = gui.find()
@@ -497,6 +501,15 @@ def grab_from_near():
             good = is_over(region, at, -8) and not covered
             check(f"view {number}: disc {plane + 1} is in the free view", good, (at, covered))
             yield from turn_at(owner, plane, at)
+    for shading in ("SOLID", "WIREFRAME"):
+        look(owner.matrix_world.translation, (0.2, 1, 0.3), 4.0 * extent(owner))
+        area.spaces.active.shading.type = shading
+        area.tag_redraw()
+        yield 1
+        picture(f"behind_{shading.lower()}")
+        hides = shading == "SOLID"
+        check(f"from behind, {shading.lower()} {'hides' if hides else 'shows'} handles", all(hidden) is hides)
+    area.spaces.active.shading.type = "SOLID"
     group.draw_prepare = prepare
     gui.click(*DELETE_BUTTON)
     yield 1
