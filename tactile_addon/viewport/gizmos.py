@@ -101,7 +101,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         active = min(settings.active_plane, settings.plane_count - 1)
         self.point.matrix_basis = Matrix.Translation(center)
         self._is_hidden = partial(_is_hidden, context, settings.target, OFF * reach)
-        self.point.hide = settings.target is None or self._is_hidden(center)
+        self.point.hide = settings.target is None
         patch = probe.patch_of(obj)
         lines = [
             [patch.matrix_world @ Vector(place) for place in np.reshape(path, (-1, 3))]
@@ -120,7 +120,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         for each, places in handles:
             place = self._put(context, each, places, taken)
             each.hide = self._is_hidden(place) or _apart(context, center, place) < APART
-        self.extent.hide = self.point.hide or seen < APART
+        self.extent.hide = self._is_hidden(center) or seen < APART
         self.extent.rim = list(patch[CURVES]["rim"][0])  # Another touch frees the patch's own.
         self.extent.matrix_basis = drawn_at(context.space_data, patch)
 

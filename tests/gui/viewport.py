@@ -486,7 +486,7 @@ def grab_from_near():
     def noted(self, context):
         prepare(self, context)
         places[:] = [turn.matrix_basis.translation.copy() for turn in self.turns]
-        hidden[:] = [each.hide for each in (self.point, self.extent, *self.turns[:3], *self.tilts[:3])]
+        hidden[:] = [each.hide for each in (self.extent, *self.turns[:3], *self.tilts[:3])]
 
     group.draw_prepare = noted
     _, area, region = gui.find()
