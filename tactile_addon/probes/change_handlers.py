@@ -28,6 +28,7 @@ SETTLE = 0.25  # A gesture counts as ended after this many seconds without a cha
 EVENT_SLICE = 0.2  # In a window, work between two events takes this many seconds.
 CHEAP = 0.05  # A touch that takes at most this many seconds is made in every frame of an animation.
 
+changes = 0  # How often Blender has evaluated something anew, which may free the meshes that it had.
 _unsure = True  # Whether any patch may be that of other inputs than it has, as after undo.
 _seen = None  # The scene and view layer that were looked at last.
 
@@ -48,6 +49,8 @@ def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> N
 
 def _bring_up_to_date(depsgraph: bpy.types.Depsgraph, dearest: float) -> None:
     """Touches again if the last touch took at most `dearest` seconds; other patches say "outdated"."""
+    global changes
+    changes += 1
     if silent.is_on or not targets() or depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
         return
     with remembered(), undo.after_step():

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty
 
-from ..probes import anchor, probe, touch_again
+from ..probes import anchor, change_handlers, probe, touch_again
 from ..probes.operators import (
     has_mesh,
     is_in_object_mode,
@@ -108,7 +108,7 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
             self.cancel(context)
             return {"CANCELLED"}
         if event.type.startswith(NAVIGATION) or (event.type == "LEFTMOUSE" and event.alt):
-            self._mouse = None
+            self._mouse = self._seen["changes"] = None
             return {"PASS_THROUGH"}
         if event.type == "MOUSEMOVE":
             self._mouse = place_of(event)
@@ -119,7 +119,9 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
 
     def _press(self, context: bpy.types.Context, mouse: tuple[int, int]) -> Outcome:
         """Makes the probe below the mouse; where no touch is possible, a pick goes on and the tool ends."""
-        words = self._hover(context, mouse)
+        # The preview is the touch, unless something has changed since.
+        is_seen = self._seen.get("changes") == change_handlers.changes and self._seen["mouse"] == mouse
+        words = self._words if is_seen else self._hover(context, mouse)
         touched = self._seen["touched"]
         if touched is None and not self.at_once:
             self._seen["refusal"] = words
@@ -209,7 +211,8 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         words = short = "Move over a mesh to touch it"
         if self._large:  # Blender builds trees of their faces then.
             short += f" (the first touch of {', '.join(sorted(self._large))} takes a while)"
-        self._seen |= {"touched": None, "refusal": None, "mouse": mouse}
+        seen = {"touched": None, "refusal": None, "mouse": mouse, "changes": change_handlers.changes}
+        self._seen |= seen
         try:
             found = point_below(context, mouse)
             if found is not None:
@@ -227,6 +230,7 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
             short = "No touch is possible here"
         self._area.header_text_set(f"Pick Reference Point     {short}")
         redraw(context, "WINDOW")
+        self._words = words
         return words
 
 

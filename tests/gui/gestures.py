@@ -68,6 +68,32 @@ def busy_click(place, how, start, *given, **options):
     yield 1
 
 
+def preview_click(place):
+    """A click takes the touch that the preview has made, unless something has changed since."""
+    operator, touches = bpy.types.TACTILE_OT_pick, []
+    inner = operator._hover
+    operator._hover = lambda self, *given: touches.append(given) or inner(self, *given)
+    window, area, region = gui.find()
+    x, y = (round(v) for v in gui.view_point(place))
+    for changes, number in ((False, 0), (True, 1)):
+        with bpy.context.temp_override(window=window, area=area, region=region):
+            bpy.ops.tactile.pick("INVOKE_DEFAULT", True, new=True)
+        gui.xdo("mousemove", x - 5, y, "sleep", 0.3, "mousemove", x, y)
+        yield 2
+        if changes:
+            bpy.context.scene.frame_set(bpy.context.scene.frame_current + 1)
+        touches.clear()
+        gui.xdo("click", 1)
+        yield 1
+        yield from until(is_complete)
+        words = "a click touches again if the scene has changed" if changes else "a click takes the preview"
+        check(words, len(touches) == number and reports()[1] == "ok", (touches, reports()))
+        bpy.data.objects.remove(patch())
+        bpy.data.objects.remove(probe())
+        yield 1
+    operator._hover = inner
+
+
 def steps():
     yield from open_tab()
     name = target()
@@ -75,6 +101,7 @@ def steps():
     center, place = below(obj, SIDE)
     look(center, SIDE, 1.6 * max(obj.dimensions))
     yield 1
+    yield from preview_click(place)
     yield from busy_click(place, "panel's button", bpy.ops.tactile.pick, "INVOKE_DEFAULT", new=True)
     yield from busy_click(place, "tool", bpy.ops.wm.tool_set_by_id, name="tactile.tool")
     window, area, region = gui.find()
