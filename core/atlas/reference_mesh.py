@@ -190,7 +190,6 @@ class ReferenceMesh:
 
     def _project(self, charts: Charts, places: Array, up: Array) -> tuple[Blend, Array]:
         """The surface near places (n, 3) that faces `up` (n, 3), and the places moved onto it."""
-        for _ in range(2):  # What is farther from a place of the mesh is another part of the surface.
-            surface = sheet_facing(charts, places, up, SAGITTA * self.edge)
-            places = places - surface.distance[:, None] * surface.normal
-        return surface, places
+        # What is farther from a place of the mesh is another part of the surface.
+        surface = sheet_facing(charts, places, up, SAGITTA * self.edge)
+        return surface, places - surface.distance[:, None] * surface.normal
