@@ -180,7 +180,9 @@ def _design(knots: Any, basis: Array) -> Any:
 
 def _student(residuals: Array, std: float) -> Array:
     """The weights (n,) of contacts that are off by `residuals` (n,)."""
-    ratios = residuals / max(std, 1.4826 * float(np.median(residuals)))
+    # Of a narrow steep patch, no contact may have its foot on it.
+    median = float(np.median(residuals)) if len(residuals) else 0.0
+    ratios = residuals / max(std, 1.4826 * median)
     return np.where(ratios > FAR_OFF, (STUDENT + 1.0) / (STUDENT + ratios**2), 1.0)
 
 

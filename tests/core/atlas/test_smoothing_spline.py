@@ -152,3 +152,10 @@ def test_between_every_other_knot_values_are_interpolated():
     x, y = np.meshgrid(np.arange(SIDE), np.arange(SIDE), indexing="ij")
     plane = 1.0 + 2.0 * x - 3.0 * y
     assert upsampled(plane[::2, ::2]) == pytest.approx(plane)
+
+
+def test_without_contacts_the_spline_is_flat_and_uncertain():
+    """As of a narrow steep patch, on which no contact has its foot."""
+    spline = fitted(np.empty((0, 3)), np.empty((0, 3)))
+    assert np.abs(spline.coefficients).max() == 0.0
+    assert np.isfinite(spline.stds).all() and spline.stds.min() > 0.1
