@@ -22,7 +22,9 @@ FLOOR = 1e-3  # No deviation below this share of the radius counts in a weight.
 # it, and those that turn by more are another sheet.
 AGREE, APART = 0.8, 0.6
 FLAT_AGREE, FLAT_APART = 0.87, 0.75  # Those of flat patches, of 30 and 41 degrees: these end where sheets do.
-LAYER = 0.15  # Patches of one sheet differ in distance by at most this share of the radius.
+# Patches of one sheet differ in distance by at most this share of the radius, and this share of the distance
+# more.
+LAYER, SLANT = 0.15, 0.5
 INSIDE = 1.0  # A patch covers what is within this share of its domain's radius.
 
 
@@ -72,7 +74,7 @@ def facing_alike(charts: Charts, pairs: Pairs, up: Array, offset: Array, radius:
 
     radius : (m,), that of a patch of the sheet
     """
-    band = LAYER * np.maximum(charts.radii[pairs.patch], radius)
+    band = LAYER * np.maximum(charts.radii[pairs.patch], radius) + SLANT * np.abs(offset)
     return _facing(charts, pairs, up) * _within(pairs.distance - offset, band)
 
 
