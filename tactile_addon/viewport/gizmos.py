@@ -167,7 +167,10 @@ def _is_hidden(context: Any, target: Any, off: float, place: Vector) -> bool:
         else place - space.clip_end * sight
     )
     start, end = (shown.matrix_world.inverted_safe() @ at for at in (place - off * sight, eye))
-    return bool(shown.ray_cast(start, end - start, distance=(end - start).length)[0])
+    try:
+        return bool(shown.ray_cast(start, end - start, distance=(end - start).length)[0])
+    except RuntimeError:  # Blender has no mesh of it, as of an object whose collection is excluded.
+        return False
 
 
 def _apart(context: bpy.types.Context, place: Vector, other: Vector) -> float:
