@@ -21,7 +21,7 @@ SIGNIFICANT = 5.0  # Noise does not explain what is off by more standard deviati
 OK, UNCERTAIN, NOT_CONVERGED = "ok", "uncertain", "not_converged"  # Each status.
 
 SHORTER, LONGER, PLANES = "use a shorter extent", "use a longer extent", "add sampling planes"
-OPPOSITE = {SHORTER: LONGER, LONGER: SHORTER}
+CONTRARY = {SHORTER: LONGER, LONGER: SHORTER}
 FROM_EDGE = "move the point away from the edge"
 FINER_FACETS = "make the facets finer"
 SUBDIVIDE = "add a Subdivision modifier if the shape is smooth"
@@ -298,7 +298,7 @@ class Judged(ABC):
         """All reasons to doubt it, the gravest first; none advises the opposite of a graver one."""
         found: list[Doubt] = []
         for doubt in self._doubting():
-            opposed = [OPPOSITE[one] for graver in found for one in graver.helpful if one in OPPOSITE]
+            opposed = [CONTRARY[one] for graver in found for one in graver.helpful if one in CONTRARY]
             found.append(replace(doubt, useless=(*doubt.useless, *opposed)))
         return tuple(found)
 
