@@ -160,9 +160,8 @@ class TACTILE_OT_drag(bpy.types.Operator):
             settings = probe.probe_of(context.object).tactile_probe
             t = Vector(plane_axes(self._matrix, settings, self.plane)[:, 0].tolist())
             right, up, normal = normal, normal.cross(t), t
-        if any(
-            abs(way.dot(normal)) < EDGE_ON for way in (direction, line_of_sight(context.region_data, center))
-        ):
+        sight = line_of_sight(context.region_data, center)
+        if min(abs(way.dot(normal)) for way in (direction, sight)) < EDGE_ON:
             return None
         at = intersect_line_plane(origin, origin + direction, center, normal)
         if at is None or (at - center).length == 0.0:

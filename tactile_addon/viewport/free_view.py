@@ -33,10 +33,9 @@ def is_free(context: bpy.types.Context, place: Vector | None, margin: float) -> 
     left, right, bottom, top = _uncovered(context)
     if not (left + margin < place.x < right - margin and bottom + margin < place.y < top - margin):
         return False
-    boxes = [
-        *((right - wide, top - tall, right, top) for wide, tall in _navigation(context)),
-        *((x, y, x + hud.width, y + hud.height) for x, y, hud in _others(context) if hud.type == "HUD"),
-    ]
+    boxes = [(right - wide, top - tall, right, top) for wide, tall in _navigation(context)]
+    huds = ((x, y, other) for x, y, other in _others(context) if other.type == "HUD")
+    boxes += [(x, y, x + hud.width, y + hud.height) for x, y, hud in huds]
     return not any(
         low_x - margin < place.x < high_x + margin and low_y - margin < place.y < high_y + margin
         for low_x, low_y, high_x, high_y in boxes

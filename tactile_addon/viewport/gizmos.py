@@ -93,24 +93,14 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         settings, matrix = obj.tactile_probe, obj.matrix_world
         reach = settings.extent or probe.record_of(obj)["extent"]
         center = matrix.translation
-        to_world: Any = context.region_data.view_matrix.inverted_safe()
-        seen = _apart(context, center, center + reach * to_world.col[0].xyz)
-        size = min(max(SHARE * seen / context.preferences.view.gizmo_size, LEAST_BALL), BALL)
-        for ball in (self.point, *self.turns, *self.tilts):  # So they do not hide a patch that is small.
-            ball.scale_basis, ball.hide = size, ball != self.point
+        seen = self._shrink(context, center, reach)
         active = min(settings.active_plane, settings.plane_count - 1)
         self.point.matrix_basis = Matrix.Translation(center)
         self._is_hidden = partial(_is_hidden, context, settings.target, OFF * reach)
         self.point.hide = settings.target is None
         patch = probe.patch_of(obj)
-        lines = [
-            [patch.matrix_world @ Vector(place) for place in np.reshape(path, (-1, 3))]
-            for path in patch[CURVES]["contours"]
-        ]
-        handles = [
-            (turn, [place for pair in zip(reversed(line), line, strict=True) for place in pair][: len(line)])
-            for turn, line in zip(self.turns[: settings.plane_count], lines, strict=False)
-        ]
+        paths = (_from_ends(patch.matrix_world, path) for path in patch[CURVES]["contours"])
+        handles = list(zip(self.turns[: settings.plane_count], paths, strict=False))
         t, up = (Vector(axis) for axis in plane_axes(matrix, settings, active).T.tolist()[:2])
         # If the tilt's plane is seen edge on, a little way of the mouse turns it by much.
         if abs(line_of_sight(context.region_data, center).dot(t)) >= STEEP:
@@ -147,6 +137,24 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         handle.matrix_basis = Matrix.Translation(place)
         taken += filter(None, [_seen(context, place)])
         return place
+
+    def _shrink(self, context: bpy.types.Context, center: Vector, reach: float) -> float:
+        """Makes the balls smaller if the patch is small in the view, so that they do not hide it.
+
+        They are hidden until they have a place. Returns the pixels at scale 1 that its radius is seen as, or inf.
+        """
+        to_world: Any = context.region_data.view_matrix.inverted_safe()
+        seen = _apart(context, center, center + reach * to_world.col[0].xyz)
+        size = min(max(SHARE * seen / context.preferences.view.gizmo_size, LEAST_BALL), BALL)
+        for ball in (self.point, *self.turns, *self.tilts):
+            ball.scale_basis, ball.hide = size, ball != self.point
+        return seen
+
+
+def _from_ends(to_world: Any, path: Any) -> list[Any]:
+    """The places of a curve in the world, from its ends to its middle: its last, its first, and so on."""
+    line = [to_world @ Vector(place) for place in np.reshape(path, (-1, 3))]
+    return [place for pair in zip(reversed(line), line, strict=True) for place in pair][: len(line)]
 
 
 def _seen(context: bpy.types.Context, place: Vector) -> Any:

@@ -211,8 +211,12 @@ class TACTILE_OT_pick(PlacedTouch, bpy.types.Operator):
         words = short = "Move over a mesh to touch it"
         if self._large:  # Blender builds trees of their faces then.
             short += f" (the first touch of {', '.join(sorted(self._large))} takes a while)"
-        seen = {"touched": None, "refusal": None, "mouse": mouse, "changes": change_handlers.changes}
-        self._seen |= seen
+        self._seen |= {
+            "touched": None,
+            "refusal": None,
+            "mouse": mouse,
+            "changes": change_handlers.changes,
+        }
         try:
             found = point_below(context, mouse)
             if found is not None:
