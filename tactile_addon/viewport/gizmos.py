@@ -141,7 +141,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
     def _shrink(self, context: bpy.types.Context, center: Vector, reach: float) -> float:
         """Makes the balls smaller if the patch is small in the view, so that they do not hide it.
 
-        They are hidden until they have a place. Returns the pixels at scale 1 that its radius is seen as, or inf.
+        They are hidden until they have a place. Returns the pixels at scale 1 that its radius spans, or inf.
         """
         to_world: Any = context.region_data.view_matrix.inverted_safe()
         seen = _apart(context, center, center + reach * to_world.col[0].xyz)
