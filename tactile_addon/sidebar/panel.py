@@ -8,7 +8,6 @@ from typing import Any
 import bpy
 from bpy.app.translations import pgettext_iface as iface
 
-from ... import core
 from ..comparison import operators as comparison
 from ..probes import probe
 from ..probes.in_slices import draw_running
@@ -29,6 +28,7 @@ from ..touch.wording import (
     reasons,
     registration_summary,
     verdict,
+    wants_facets_finer,
 )
 from ..whole_object.object_report import (
     deviation,
@@ -74,7 +74,7 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         row = layout.row(align=True)
         move = row.row(align=True)
         move.enabled = probe.lock_of(found) is None
-        move.operator("tactile.pick", text="Move", icon="EYEDROPPER")
+        move.operator("tactile.pick", text="Move" if _is_wide(context) else "", icon="EYEDROPPER")
         row.operator("tactile.pick", text="New", icon="ADD").new = True
         row.operator("tactile.delete", text="", icon="TRASH")
         settings = found.tactile_probe
@@ -108,7 +108,7 @@ def _draw_pick(context: bpy.types.Context, layout: bpy.types.UILayout, obj: Obje
 
 def _draw_planes(context: bpy.types.Context, layout: bpy.types.UILayout, settings: Any) -> None:
     """Draws the angles of the planes; a narrow sidebar has room for one of the two."""
-    is_wide = context.region.width > NARROW * context.preferences.system.ui_scale
+    is_wide = _is_wide(context)
     column = layout.column(align=True)
     heading = column.row(align=True)
     heading.label(text="", icon="BLANK1")
@@ -123,6 +123,10 @@ def _draw_planes(context: bpy.types.Context, layout: bpy.types.UILayout, setting
         if is_wide:
             row.prop(settings, "tilts", index=i, text="")
         row.operator("tactile.remove_plane", text="", icon="REMOVE").plane = i
+
+
+def _is_wide(context: bpy.types.Context) -> bool:
+    return context.region.width > NARROW * context.preferences.system.ui_scale
 
 
 class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
@@ -149,11 +153,11 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
             draw_sentence(context, layout, verdict(record), ICONS.get(record["status"], "ERROR"), in_two=True)
         draw_rows(context, layout, main_rows(record), active=not is_outdated)
         _draw_colors(context, layout, patch, "tactile_colors")
-        _draw_shown(layout, found, patch)
+        _draw_shown(context, layout, found, patch)
         # This button comes and goes while a probe is dragged, so that what is above does not jump.
         if found is not None and is_outdated:
             layout.operator("tactile.update", icon="FILE_REFRESH")
-        elif found is not None and any(core.SUBDIVIDE in doubt["advice"] for doubt in record["doubts"]):
+        elif found is not None and wants_facets_finer(record):
             layout.operator("tactile.add_subdivision", icon="MOD_SUBSURF")
         _draw_comparison(context, layout, record)
         if body := _folded(layout, "more", "More"):
@@ -218,6 +222,9 @@ class TACTILE_PT_probes(_Sidebar, bpy.types.Panel):
 
     def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
         """Draws a row for each probe, to click: its verdict as an icon, its name and its curvatures."""
+        row = layout.row(align=True)
+        row.operator("tactile.export_table", text="Table", icon="EXPORT")
+        row.operator("tactile.export_report", text="Report", icon="FILE_TEXT")
         column = layout.column(align=True)
         probes: list[Object] = [each for each in context.view_layer.objects if probe.is_probe(each)]
         for found in sorted(probes, key=lambda each: each.name):
@@ -228,9 +235,6 @@ class TACTILE_PT_probes(_Sidebar, bpy.types.Panel):
             column.operator(
                 "tactile.activate", text=text, icon=icon, depress=is_active, translate=False
             ).name = found.name
-        row = layout.row(align=True)
-        row.operator("tactile.export_table", text="Table", icon="EXPORT")
-        row.operator("tactile.export_report", text="Report", icon="FILE_TEXT")
 
 
 def _draw_more(
@@ -270,16 +274,19 @@ def _draw_range(context: bpy.types.Context, layout: bpy.types.UILayout, patch: O
     row.prop(patch, "tactile_range", text=words.rstrip(), translate=False)
 
 
-def _draw_shown(layout: bpy.types.UILayout, found: Object | None, patch: Object) -> None:
-    """Draws the switches of what is shown with a patch and may hide it."""
+def _draw_shown(
+    context: bpy.types.Context, layout: bpy.types.UILayout, found: Object | None, patch: Object
+) -> None:
+    """Draws the switches of what is shown with a patch and may hide it; a narrow sidebar has their icons."""
+    words: dict[str, Any] = {} if _is_wide(context) else {"text": ""}
     row = layout.row(align=True)
     row.use_property_split = False
-    row.prop(patch, "tactile_contours", icon="CURVE_DATA", toggle=1)
+    row.prop(patch, "tactile_contours", icon="CURVE_DATA", toggle=1, **words)
     directions = row.row(align=True)
     directions.active = "directions" in patch.get(patch_record.CURVES, ())
-    directions.prop(patch, "tactile_directions", icon="EMPTY_AXIS", toggle=1)
+    directions.prop(patch, "tactile_directions", icon="EMPTY_AXIS", toggle=1, **words)
     if found is not None:
-        row.prop(found.tactile_probe, "show_handles", icon="GIZMO", toggle=1)
+        row.prop(found.tactile_probe, "show_handles", icon="GIZMO", toggle=1, **words)
 
 
 def _draw_comparison(context: bpy.types.Context, layout: bpy.types.UILayout, record: TouchReport) -> None:

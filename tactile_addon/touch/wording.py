@@ -69,9 +69,18 @@ def verdict(report: TouchReport) -> str:
     if report["doubts"]:
         return f"Doubtful: {report['doubts'][0]['advice']}"
     height = say_of(report, report["height_std"])
+    if wants_facets_finer(report):
+        return "Good on facets: add a Subdivision modifier to feel curvatures"
     if _is_uncertain(report):
         return f"Good heights, to ± {height}; curvatures are uncertain"
     return f"Good: heights to ± {height}"
+
+
+def wants_facets_finer(report: Mapping[str, Any]) -> bool:
+    """Whether facets are too few for what the verdict is about, so that a Subdivision modifier may help."""
+    if report["doubts"]:
+        return any(core.SUBDIVIDE in doubt["advice"] for doubt in report["doubts"])
+    return _is_uncertain(report) and report.get("facet_width", 0.0) > 0.0
 
 
 def _is_uncertain(report: Mapping[str, Any]) -> bool:

@@ -88,6 +88,21 @@ def test_a_good_verdict_says_where_curvatures_are_uncertain(wording, more, is_un
     assert (wording.curvatures(record(**more)) == "not certain") is is_uncertain
 
 
+def test_a_good_verdict_on_facets_says_what_shows_curvatures(wording):
+    assert "facets" not in wording.verdict(record(facet_width=0.1))
+    words = wording.verdict(record(facet_width=0.1, k2_std=0.2))
+    assert words == "Good on facets: add a Subdivision modifier to feel curvatures"
+
+
+def test_a_patch_on_a_facet_has_the_button_that_helps(extension, wording, empty):
+    empty.ops.mesh.primitive_monkey_add()
+    empty.ops.tactile.pick(location=empty.context.object.data.polygons[300].center)
+    obj = empty.context.object
+    report = obj.children[0]["tactile"].to_dict()
+    assert report["status"] == "ok" and wording.verdict(report).startswith("Good on facets")
+    assert "tactile.add_subdivision" in [text for text, _ in drawn_of(empty, extension, obj)]
+
+
 def test_a_flat_patch_has_no_shape_index(wording, empty):
     empty.ops.mesh.primitive_cube_add()
     empty.ops.tactile.pick(target="Cube", location=(0.2, 0.1, 1.0))
@@ -183,18 +198,18 @@ def test_lengths_in_messages_are_in_the_unit_of_the_scene(extension, empty):
 def test_panels_have_the_scene_s_unit_unless_numbers_in_it_would_be_long(extension, empty):
     units, scene = extension.tactile_addon.touch.units, empty.context.scene
     assert scene.unit_settings.length_unit == "METERS"
-    assert [units.unit_of(scene, size)[0] for size in (5.0, 0.05, 0.012, 0.005)] == ["m", "cm", "cm", "mm"]
-    record = {"radius": 0.01, "size": 0.2, "tolerance": 2e-4, "height_std": 1e-5, "color_limit": 48.0}
-    assert extension.tactile_addon.touch.units.unit_of_report(record)[0] == "cm"
+    assert [units.unit_of(scene, size)[0] for size in (5.0, 0.05, 0.012, 0.005)] == ["m", "m", "m", "mm"]
+    record = {"radius": 0.01, "size": 0.08, "tolerance": 2e-4, "height_std": 1e-5, "color_limit": 48.0}
+    assert extension.tactile_addon.touch.units.unit_of_report(record)[0] == "mm"
     empty.ops.mesh.primitive_cube_add()
     empty.context.object["tactile_object"] = record
     for shown in ("mean_curvature", "deviation"):  # One object has one unit, whatever is shown.
         empty.context.object.tactile_colors = shown
-        assert extension.tactile_addon.scene.shown.unit_of_range(empty.context.object)[1][0] == "cm"
+        assert extension.tactile_addon.scene.shown.unit_of_range(empty.context.object)[1][0] == "mm"
     record["color_limit"] = 48.0
     empty.context.object["tactile_object"] = record
     empty.context.object.tactile_colors = "mean_curvature"
-    assert empty.context.object.tactile_range == pytest.approx(0.48)
+    assert empty.context.object.tactile_range == pytest.approx(0.048)
 
 
 class Layout:
