@@ -49,11 +49,11 @@ class Mesh(NamedTuple):
 
     @property
     def edge(self) -> float:
-        """The median length of the edges; 0 without triangles."""
+        """The median length of the triangles' sides; 0 without triangles."""
         if not len(self.triangles):
             return 0.0
-        a, b = self.vertices[self.triangles[:, :2]].transpose(1, 0, 2)
-        return float(np.median(np.linalg.norm(b - a, axis=1)))
+        ends = self.vertices[self.triangles]
+        return float(np.median(np.linalg.norm(ends - np.roll(ends, 1, axis=1), axis=2)))
 
     @property
     def border(self) -> Indices:

@@ -276,10 +276,7 @@ class TACTILE_OT_verify(WithMesh, bpy.types.Operator):
 
 
 class Search:
-    """The search for the place of a patch on a mesh object, in another thread, which does not use Blender.
-
-    began : when it began, in seconds
-    """
+    """The search for the place of a patch on a mesh object, in another thread, which does not use Blender."""
 
     def __init__(self, patch: Object, target: Object, depsgraph: bpy.types.Depsgraph) -> None:
         if probe.probe_of(patch) is not None:
@@ -288,7 +285,6 @@ class Search:
         given = patch_record.reconstruction_of(patch), mesh.points + mesh.origin, mesh.triangles
         self.patch, self.target, self._matrix = patch.name, target.name, patch.matrix_world.copy()
         self._found: futures.Future[list[core.Pose]] = futures.Future()
-        self.began = perf_counter()
         threading.Thread(target=self._run, args=given, daemon=True).start()
 
     def _run(self, *given: Any) -> None:
@@ -356,7 +352,7 @@ class TACTILE_OT_register(WithMesh, bpy.types.Operator):
         self._steps = self._search.steps()
 
     def _done(self) -> Progress:
-        seconds = perf_counter() - self._search.began
+        seconds = perf_counter() - self._begun
         return f'Looking for the patch on "{self._search.target}": {seconds:.0f} s', None
 
     def _finish(self, context: bpy.types.Context) -> Outcome:

@@ -80,7 +80,7 @@ class InSlices(OperatorMixin):
         if self._in_window:
             return self._go_on(context)
         self._check(context)
-        said = perf_counter()
+        self._begun = said = perf_counter()
         for share in self._steps:
             self._share = share
             if self.progress and perf_counter() > said + SAY:

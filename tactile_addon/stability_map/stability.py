@@ -4,6 +4,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from statistics import median
 from time import perf_counter
 from typing import Any
@@ -12,6 +13,7 @@ import bpy
 import numpy as np
 
 from ... import core
+from ...core.steps import chunked
 from ...core.triangles import cut_to_edges, triangle_cross
 from ..scene.mesh_data import MEASURES
 from ..touch.detached_mesh import DetachedMesh
@@ -147,19 +149,14 @@ class StabilityMap:
             self.done = end
         yield from self.spread()
 
-    def spread(self) -> Iterator[None]:
+    def spread(self) -> Iterator[Any]:
         """Finds the touch for each face and vertex among those that are done, as a generator like `steps`."""
         from scipy.spatial import cKDTree
 
         tree = cKDTree(self.places[: self.done])
-        self.touch_in, self.touch_of = (
-            np.empty(len(at), dtype=np.intp) for at in (self._middles, self.points)
-        )
-        for nearest, places in ((self.touch_in, self._middles), (self.touch_of, self.points)):
-            for start in range(0, len(places), NEAREST_AT_ONCE):
-                some = slice(start, start + NEAREST_AT_ONCE)
-                nearest[some] = tree.query(places[some])[1]
-                yield
+        nearest = partial(chunked, lambda some: (tree.query(some)[1],), NEAREST_AT_ONCE, 1.0)
+        (self.touch_in,) = yield from nearest(self._middles)
+        (self.touch_of,) = yield from nearest(self.points)
 
     def _touch(self, numbers: Sequence[int]) -> Iterator[None]:
         """Makes the touches with these numbers, as a generator like `steps`."""

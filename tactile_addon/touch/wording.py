@@ -78,9 +78,8 @@ def verdict(report: TouchReport) -> str:
 
 def wants_facets_finer(report: Mapping[str, Any]) -> bool:
     """Whether facets are too few for what the verdict is about, so that a Subdivision modifier may help."""
-    if report["doubts"]:
-        return any(core.SUBDIVIDE in doubt["advice"] for doubt in report["doubts"])
-    return _is_uncertain(report) and report.get("facet_width", 0.0) > 0.0
+    is_advised = any(core.SUBDIVIDE in doubt["advice"] for doubt in report["doubts"])
+    return is_advised or (report.get("facet_width", 0.0) > 0.0 and _is_uncertain(report))
 
 
 def _is_uncertain(report: Mapping[str, Any]) -> bool:

@@ -4,6 +4,7 @@
 
 import math
 from collections.abc import Callable, Generator, Iterator, Mapping
+from itertools import product
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -20,12 +21,14 @@ PLACES, SEED = 10_000, 0  # The number of places on the faces of each, and the m
 STARTS = 24  # From so many of them the farthest place of all is looked for, as in `_climb`,
 MOVES = 20  # by so many moves, half as long after each that would lead back.
 AT_ONCE, BACK_AT_ONCE = 1000, 300  # The number of places of the surface, or of the mesh, for a step.
-WAYS = 40  # A place is hidden if rays in this many directions all meet the mesh again.
-LIFT = 1e-4  # They begin this share of the size away from it.
+LIFT = 1e-4  # Rays begin this share of the size away from a place.
 # The indicator of a surface has at most 200 cells along the object, of which a wall needs three.
 THIN_SHARE = 3.0 / 200.0
 HIDDEN_SHARE = 0.1  # A place is nearly hidden if at most this share of the rays around it meets nothing.
-GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
+AXES = np.vstack([np.eye(3), -np.eye(3)])
+# The directions from a place, 50: along the axes, as the holes of parts are, and between these.
+WAYS = [way for way in product(range(-2, 3), repeat=3) if math.gcd(*way) == 1 and math.hypot(*way) < 2.3]
+DIRECTIONS = normalized(np.array(WAYS, dtype=float))
 
 Nearest: TypeAlias = Callable[[Point], tuple[Point, float]]
 
@@ -206,14 +209,3 @@ def _free_share(surface: DetachedMesh, foot: Array, normal: Array) -> float:
     """The share of rays on the outer side of a place of the mesh that meet nothing."""
     ways = DIRECTIONS[DIRECTIONS @ normal > 0.0]
     return sum(math.isinf(room(surface, foot, way)) for way in ways) / len(ways)
-
-
-def _directions() -> Array:
-    """Unit vectors (WAYS, 3) all round."""
-    z = 1.0 - (2.0 * np.arange(WAYS) + 1.0) / WAYS
-    turn, out = GOLDEN * np.arange(WAYS), np.sqrt(1.0 - z**2)
-    return np.column_stack([out * np.cos(turn), out * np.sin(turn), z])
-
-
-DIRECTIONS = _directions()
-AXES = np.vstack([np.eye(3), -np.eye(3)])

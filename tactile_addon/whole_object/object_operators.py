@@ -239,9 +239,8 @@ class TACTILE_OT_look_farthest(bpy.types.Operator):
             view.view_rotation = (turn @ sight).to_track_quat("Z", "Y")
             view.view_distance = SEEN * record["size"] * obj.matrix_world.median_scale
         obj.tactile_colors = DEVIATION
-        reach = "" if is_reached else ", which does not reach it"
-        largest = deviation(record, "max")
-        return report_done(self, f'Here "{record["source"]}" is {largest} off the surface{reach}')
+        words = f'Here "{record["source"]}" is {deviation(record, "max")} off the surface'
+        return report_done(self, words if is_reached else f"{words}, which does not reach it")
 
 
 def _free_sight(seen: Object, vertex: Any, far: float) -> Vector:

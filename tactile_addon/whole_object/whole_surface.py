@@ -77,7 +77,7 @@ class WholeSurface:
             "is_closed": mesh.is_closed and not atlas.uncovered,
             "vertices": len(mesh.vertices),
             "triangles": len(mesh.triangles),
-            "edge": _edge(mesh),
+            "edge": mesh.edge,
             "unknown_curvatures": int(np.isinf(self.curvatures["mean_curvature_std"]).sum()),
             "height_std": float(mesh.std[np.isfinite(mesh.std)].mean()),  # It is inf where nothing was felt.
             "radius": float(np.median([r.radius for r in atlas.patches])),
@@ -89,9 +89,3 @@ class WholeSurface:
         if not doubts and self.mesh.rims > self.atlas.reference.mesh.rims:
             doubts.append(core.Doubt("holes"))
         return doubts
-
-
-def _edge(mesh: core.Mesh) -> float:
-    """The median length of all sides of a mesh's triangles; Mesh.edge takes one of each, which may differ."""
-    ends = mesh.vertices[mesh.triangles]
-    return float(np.median(np.linalg.norm(ends - np.roll(ends, 1, axis=1), axis=2)))
