@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Systems of up to a hundred unknowns by scipy's LAPACK, which is faster than numpy for one.
+"""Systems of up to a hundred unknowns by scipy's LAPACK, which is faster than numpy for a single one.
 
 The numpy and scipy of PyPI each have their own OpenBLAS with its own threads. If they are called by turns,
 these wait for each other's processors, and a touch takes twice as long, or ten times on a busy machine
@@ -80,15 +80,15 @@ def cholesky(matrix: Array) -> Array:
     return factor.T
 
 
-def cholesky_in_place(matrix: Array) -> Array:
+def cholesky_diagonal(matrix: Array) -> Array:
     """The diagonal (m,) of the Cholesky factor of a positive definite matrix (m, m).
 
-    The factor itself overwrites the upper triangle of the matrix. Where the matrix is not positive definite
+    The matrix, C-contiguous and of double precision, is used up. Where the matrix is not positive definite
     the factor ends early, which no error reports. Callers limit the threads themselves, with `on_one_thread`,
     because they call it many times.
     """
     _lapack().dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
-    return matrix.reshape(-1)[:: len(matrix) + 1]
+    return matrix.diagonal()
 
 
 @on_one_thread

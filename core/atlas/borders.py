@@ -18,21 +18,21 @@ from ..arguments import Array
 from ..contours.contour import vector_of
 from ..contours.finger import Contact
 from ..triangles import LEAST_DIVISOR, SAME, normalized, row_dot, triangle_cross
-from .connectivity import Indices
+from .connectivity import Indices, connected_pieces
 from .finger import Finger
 from .meshing import Mesh
 
 # python -m benchmarks.atlas judges these.
 REACH, STEP = 6.0, 0.5  # A border is looked for within this many edges of the mesh's, in such steps,
 HALVINGS = 8  # and then by this many halvings.
-TURNED = 0.87  # A border has a corner where the cosine between its directions on both sides is less,
+TURNED = 0.87  # A border has a corner where the |cosine| between its directions on both sides is less,
 STRAIGHT = 0.1  # if it is straight on both sides to this share of an edge.
 INWARD = 0.1  # Corners are felt this share of the way from there to the middle of the chord across them.
 SMOOTHINGS = 3  # This often directions of a border become the means of their neighbors'.
 UNFOLDINGS = 8  # Triangles that turn over are mended this often; nearly all are after one (test_borders).
 NEAREST = 12  # The nearest segment is one of this many whose middles are nearest.
-# Sides of the border below this share of an edge are one place: with 1e-6 the triangle of one turns over at a
-SHORT = 0.01  # notch of an open sheet under SkylakeX (test_borders).
+# Sides of the border below this share of an edge are one place. With 1e-6 the triangle of one turns over at a
+SHORT = 0.01  # notch of an open sheet, with the kernels that OpenBLAS has for SkylakeX (test_borders).
 
 PLACES_AT_ONCE = 1000  # A step feels this many places.
 
@@ -62,7 +62,7 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
     if mesh.is_closed:
         return Border(np.zeros((0, 2, 3)), np.zeros((0, 3)), np.zeros((0, 3)), 0.0)
     yield 0.0
-    at, before, after, ways, normals = _rim_of(mesh)
+    at, before, after, ways, normals = _border_frames(mesh)
     yield 0.0
     places = mesh.vertices[at]
     off = partial(_above, partial(finger.near, length=near), normals)
@@ -115,8 +115,8 @@ def _contacts(
     return contacts
 
 
-def _rim_of(mesh: Mesh) -> tuple[Indices, Indices, Indices, Array, Array]:
-    """The vertices (n,) of a mesh's border, and the first and last of each side (k,).
+def _border_frames(mesh: Mesh) -> tuple[Indices, Indices, Indices, Array, Array]:
+    """The vertices (n,) of a mesh's border, and the places (k,) among these of both ends of each side.
 
     Also the ways beyond the border and the normals there, (n, 3) each.
     """
@@ -126,10 +126,10 @@ def _rim_of(mesh: Mesh) -> tuple[Indices, Indices, Indices, Array, Array]:
     along = np.zeros_like(places)
     np.add.at(along, np.stack([before, after], axis=1), (places[after] - places[before])[:, None])
     for _ in range(SMOOTHINGS):
-        mean = along.copy()
-        np.add.at(mean, before, along[after])
-        np.add.at(mean, after, along[before])
-        along = normalized(mean)
+        total = along.copy()
+        np.add.at(total, before, along[after])
+        np.add.at(total, after, along[before])
+        along = normalized(total)
     normals = mesh.normals[at]
     return at, before, after, np.cross(along, normals), normals
 
@@ -154,21 +154,22 @@ def _lengths(
 
 def _corners(places: Array, before: Indices, after: Indices, edge: float) -> tuple[Array, NDArray[np.bool_]]:
     """Where the lines of a border on both sides of its segments meet, (k, 3), and whether they do, (k,)."""
-    leading, following = (np.arange(len(places)) for _ in range(2))
-    leading[after], following[before] = before, after
+    previous, following = (np.arange(len(places)) for _ in range(2))
+    previous[after], following[before] = before, after
     meet, sides = np.ones(len(before), dtype=bool), []
-    # The ends of a segment may be off the lines that meet at a corner, so these are taken from the next ones.
-    for end, way in ((before, leading), (after, following)):
-        start = places[way[end]]
-        along = normalized(start - places[way[way[end]]])
+    # The ends of a segment may be off the lines that meet at a corner, so lines are those of the two segments
+    # beyond. Where the border ends before, there are none.
+    for end, neighbor in ((before, previous), (after, following)):
+        start = places[neighbor[end]]
+        along = normalized(start - places[neighbor[neighbor[end]]])
         foot = start + row_dot(places[end] - start, along)[:, None] * along
         meet &= np.linalg.norm(places[end] - foot, axis=1) < STRAIGHT * edge
         sides += [foot, along]
     a, u, b, v = sides
     cosine, along_u, along_v = row_dot(u, v), row_dot(b - a, u), row_dot(b - a, v)
-    area = np.maximum(1.0 - cosine**2, LEAST_DIVISOR)
-    s, t = (along_u - cosine * along_v) / area, (cosine * along_u - along_v) / area
-    meet &= np.abs(cosine) < TURNED
+    squared_sine = np.maximum(1.0 - cosine**2, LEAST_DIVISOR)
+    s, t = (along_u - cosine * along_v) / squared_sine, (cosine * along_u - along_v) / squared_sine
+    meet &= (np.abs(cosine) < TURNED) & u.any(axis=1) & v.any(axis=1)
     meet &= (np.minimum(s, t) > -STRAIGHT * edge) & (np.maximum(s, t) < REACH * edge)
     corners = 0.5 * (a + s[:, None] * u + b + t[:, None] * v)
     return np.where(meet[:, None], corners, places[before]), meet
@@ -192,7 +193,7 @@ def snapped_to_border(mesh: Mesh, border: Border) -> Mesh:
         mesh = mesh.chosen(~ears)
     if not len(mesh.border):  # Nothing is left of a small mesh.
         return mesh
-    at, _, _, toward, _ = _rim_of(mesh)
+    at, _, _, toward, _ = _border_frames(mesh)
     vertices = mesh.vertices.copy()
     feet, ways = _feet(border, vertices[at])
     # Where the mesh ends though the surface goes on, the way beyond is another; in front of a corner it is
@@ -234,13 +235,14 @@ def _unfolded(mesh: Mesh, before: Mesh, fixed: Indices) -> Mesh:
 
 
 def _welded(mesh: Mesh) -> Mesh:
-    """The mesh without sides of its border that are SHORT, as where some vertices move into a corner."""
+    """The mesh without sides of its border that are SHORT, as where some vertices move into a corner.
+
+    Of what is one place the first vertex stays. Triangles that would lie back to back are left out.
+    """
     a, b = mesh.border.T
     same = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1) < SHORT * mesh.edge
-    first = np.arange(len(mesh.vertices))
-    for one, two in zip(a[same].tolist(), b[same].tolist(), strict=True):
-        first[first == first[two]] = first[one]
-    triangles = first[mesh.triangles]
+    _, place = connected_pieces(a[same], b[same], len(mesh.vertices))
+    triangles = np.unique(place, return_index=True)[1][place][mesh.triangles]
     _, index, counts = np.unique(np.sort(triangles, axis=1), axis=0, return_inverse=True, return_counts=True)
     # A vertex with three neighbors, of which two are welded, leaves two triangles back to back.
     some = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1) & (counts[index.ravel()] == 1)

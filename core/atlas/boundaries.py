@@ -38,14 +38,18 @@ class Edge(NamedTuple):
 
 
 def node_dict(r: Reconstruction, std: float) -> dict[str, Any]:
-    """A patch of mean deviation `std` as a node of the graph, in plain values: its place and its shape."""
+    """A patch as a node of the graph, in plain values.
+
+    std : the mean standard deviation of the height of the joined patch, a length
+    """
     return {
         "frame": {"origin": r.frame.origin.tolist(), "axes": r.frame.axes.tolist()},
         "radius": r.radius,
         "polynomial": polynomial_dict(r.patch),
         "domain": r.domain.ends.tolist(),
         "mean_height_std": std,
-        **{name: getattr(r, name) for name in ("status", "message")},
+        "status": r.status,
+        "message": r.message,
     }
 
 

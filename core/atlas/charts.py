@@ -26,7 +26,7 @@ REACH = 0.5  # A patch is evaluated at places up to this share of its radius abo
 CATMULL_ROM = np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]]) / 2.0
 ASIDE = 0.3  # What is farther than this share of the radius off the normal at its foot has no foot.
 FLAT = 0.15  # A patch is flat if it is nowhere steeper than this slope to its own plane.
-STEEPEST = 0.4  # Where a patch is steeper, this cosine to its own plane, it has no feet: heights run away.
+LEAST_COSINE = 0.4  # Where the normal has a lesser cosine to that at the point, heights run away: no feet.
 PLACES_AT_ONCE = 3000  # A step takes this many places.
 CHUNK = 24_000  # This many pairs of a place and a patch fit into the processor's cache at once.
 
@@ -151,13 +151,13 @@ class Charts:
         place, patch, rho = place[which], patch[which], rho[which]
         x, y, z, foot_x, foot_y = np.array([x, y, z, foot_x, foot_y])[:, which]
         h, hx, hy = self._heights(foot_x, foot_y, patch)
-        steep, radius = 1.0 / np.sqrt(1.0 + hx**2 + hy**2), self.radii[patch]
-        distance = (z - h - hx * (x - foot_x) - hy * (y - foot_y)) * steep
+        cosine, radius = 1.0 / np.sqrt(1.0 + hx**2 + hy**2), self.radii[patch]
+        distance = (z - h - hx * (x - foot_x) - hy * (y - foot_y)) * cosine
         aside = (x - foot_x) ** 2 + (y - foot_y) ** 2 + (z - h) ** 2 - distance**2
-        std = self.stds_at(foot_x, foot_y, patch) * steep
-        normal = self._to_world_directions(patch, np.array([-hx * steep, -hy * steep, steep]))
+        std = self.stds_at(foot_x, foot_y, patch) * cosine
+        normal = self._to_world_directions(patch, np.array([-hx * cosine, -hy * cosine, cosine]))
         pairs = Pairs(place, patch, rho, distance * radius, normal, std * radius)
-        return pairs.chosen((aside < ASIDE**2) & (np.abs(distance) < reach[patch]) & (steep > STEEPEST))
+        return pairs.chosen((aside < ASIDE**2) & (np.abs(distance) < reach[patch]) & (cosine > LEAST_COSINE))
 
     def _to_world_directions(self, patch: NDArray[np.intp], local: Array) -> Array:
         """Directions (3, m) in the frames of patches, as the caller sees them, (m, 3)."""
@@ -240,8 +240,8 @@ class Charts:
     def world(self, patch: NDArray[np.intp], x: Array, y: Array) -> tuple[Array, Array]:
         """Points and normals (m, 3) of patches above local (x, y), which are in unit radius."""
         h, hx, hy = self._heights(x, y, patch)
-        steep = 1.0 / np.sqrt(1.0 + hx**2 + hy**2)
+        cosine = 1.0 / np.sqrt(1.0 + hx**2 + hy**2)
         points = self.origins[patch] + self._to_world_directions(
             patch, np.array([x, y, h]) * self.radii[patch]
         )
-        return points, self._to_world_directions(patch, np.array([-hx * steep, -hy * steep, steep]))
+        return points, self._to_world_directions(patch, np.array([-hx * cosine, -hy * cosine, cosine]))

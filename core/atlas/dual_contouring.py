@@ -148,9 +148,9 @@ def _sides(charts: Charts, band: float, places: Array) -> tuple[Any, ...]:
 def _planes(lattice: Lattice, sides: Sides, edges: Indices) -> tuple[Array, Blend]:
     """Places (n, 3) where the surface crosses edges (n,), and the sheets there.
 
-    The plane is that of the nearest sheet at the outer or the inner end that crosses the edge. Where neither
-    does, it is the nearest one that puts an end on its side; where none of them does, it is the level of the
-    indicator, which has no patch.
+    The plane is that of the nearest sheet at the outer or the inner end, whichever misses the edge by less.
+    If that is by CROSSED or more, it is the nearest one that puts an end on its side; if these miss by as
+    much, it is the level of the indicator, which has no patch.
     """
     one, other = lattice.ends(edges)
     is_inside = lattice.inside(one)
@@ -158,16 +158,16 @@ def _planes(lattice: Lattice, sides: Sides, edges: Indices) -> tuple[Array, Blen
     origin = lattice.places(inner)
     way = lattice.places(outer) - origin
     a, b = (np.searchsorted(sides.points, ends) for ends in (inner, outer))
-    nearest = sides.nearest.at(b)
-    shares, missed = _crossing(nearest, way, 1.0)
-    for sheet, end, most in (
+    best = sides.nearest.at(b)
+    shares, missed = _crossing(best, way, 1.0)
+    for sheet, end, replaced_from in (
         (sides.nearest.at(a), 0.0, 0.0),
         (sides.outside.at(b), 1.0, CROSSED),
         (sides.inside.at(a), 0.0, CROSSED),
     ):
         share, miss = _crossing(sheet, way, end)
-        is_better = (miss < missed) & (missed >= most)
-        nearest = sheet.where(is_better, nearest)
+        is_better = (miss < missed) & (missed >= replaced_from)
+        best = sheet.where(is_better, best)
         shares, missed = np.where(is_better, share, shares), np.where(is_better, miss, missed)
     at_inner, at_outer = (lattice.indicator.at(places) for places in (origin, origin + way))
     level = np.clip(at_inner / np.where(at_inner > at_outer, at_inner - at_outer, 1.0), 0.0, 1.0)
@@ -175,7 +175,7 @@ def _planes(lattice: Lattice, sides: Sides, edges: Indices) -> tuple[Array, Blen
     places = origin + np.where(is_felt, shares, level)[:, None] * way
     nothing = np.full(len(edges), np.inf)
     unfelt = Blend(level, nothing, lattice.indicator.outward(places), np.full(len(edges), -1), nothing)
-    return places, nearest.where(is_felt, unfelt)
+    return places, best.where(is_felt, unfelt)
 
 
 def _crossing(sheet: Blend, way: Array, end: float) -> tuple[Array, Array]:
@@ -272,15 +272,15 @@ def _cut(vertices: Array, quads: Indices, normals: Array, pitch: float) -> tuple
 
 
 def _planes_around(quads: Indices, bent: Indices) -> tuple[Indices, Indices]:
-    """The planes (k,) around the four cells of bent quadrilaterals (m,), and for each which of these it is.
+    """Pairs of a plane (k,) and the number (k,) in `bent` of a quadrilateral that shares a cell with it.
 
-    quads : (n, 4), the cells around each plane
+    quads : (n, 4), the cells around each plane; the quadrilateral of a plane has its number
     """
     from scipy.sparse import csr_array
 
-    ends = np.arange(0, 4 * len(quads) + 1, 4)
+    row_starts = np.arange(0, 4 * len(quads) + 1, 4)
     shape = len(quads), int(quads.max(initial=0)) + 1
-    cells = csr_array((np.ones(4 * len(quads)), quads.ravel(), ends), shape)
+    cells = csr_array((np.ones(4 * len(quads)), quads.ravel(), row_starts), shape)
     shared = (cells[bent] @ cells.T).tocoo()
     return shared.col, shared.row
 

@@ -34,7 +34,7 @@ class Blend(NamedTuple):
     distance, std : (k,), signed, and its deviation; 0 and inf where no patch reaches
     normal : (k, 3), the gradient
     patch : (k,), index of the patch of most weight; -1 where no patch reaches
-    rho : (k,), how far out the places are on the patch where they are least so; inf where no patch reaches
+    rho : (k,), the least of their shares of the radius of a patch's domain; inf where no patch reaches
     """
 
     distance: Array
@@ -58,7 +58,7 @@ class Blend(NamedTuple):
         )
 
 
-def node_weights(charts: Charts, pairs: Pairs) -> Array:
+def patch_weights(charts: Charts, pairs: Pairs) -> Array:
     """The weights (m,) of patches in a blend."""
     return weights_of(pairs.rho, pairs.std, charts.radii[pairs.patch])
 
@@ -97,7 +97,7 @@ def sheet_facing(charts: Charts, points: Array, up: Array, near: Array | float) 
     """The sheet with normals `up` (k, 3) near places (k, 3), of patches within a length (k,)."""
     pairs, near = charts.pairs(points, float(np.max(near, initial=0.0))), np.broadcast_to(near, len(points))
     alike = _facing(charts, pairs, up[pairs.point_index]) * _within(pairs.distance, near[pairs.point_index])
-    return _weighted_mean(pairs, node_weights(charts, pairs) * alike, len(points))
+    return _weighted_mean(pairs, patch_weights(charts, pairs) * alike, len(points))
 
 
 def distances_within_rims(charts: Charts, pairs: Pairs) -> Array:
@@ -112,7 +112,7 @@ def nearest_sheet(charts: Charts, pairs: Pairs, count: int) -> Blend:
     nearest = nearest[pairs.point_index]
     up, radius = pairs.normal[nearest], charts.radii[pairs.patch[nearest]]
     alike = facing_alike(charts, pairs, up, pairs.distance[nearest], radius)
-    return _weighted_mean(pairs, node_weights(charts, pairs) * alike, count)
+    return _weighted_mean(pairs, patch_weights(charts, pairs) * alike, count)
 
 
 def covered(
@@ -143,7 +143,7 @@ def argmin_per_point(place: NDArray[np.intp], key: NDArray[Any], count: int) -> 
 
 
 def _weighted_mean(pairs: Pairs, w: Array, count: int) -> Blend:
-    """Weighted means at `count` places, with the deviation of the mean distance.
+    """Weighted means at `count` places, with the deviation of the mean distance; the least rho.
 
     Patches that share contacts err alike, so their deviations do not average out as independent ones do. But
     the squared error of a mean is the mean squared error minus the mean square by which patches differ from
@@ -153,17 +153,17 @@ def _weighted_mean(pairs: Pairs, w: Array, count: int) -> Blend:
 
     def total(values: Array) -> Array:
         """Weighted sums (count,) over the pairs at each place."""
-        return np.bincount(place, w * values, count).astype(np.float64)  # It counts no pairs in integers.
+        return np.bincount(place, w * values, count).astype(np.float64)  # Without pairs it is integers.
 
-    some = total(np.ones(len(w)))
-    is_met = some > 0.0
-    scale = 1.0 / np.where(is_met, some, 1.0)
+    weight = total(np.ones(len(w)))
+    is_met = weight > 0.0
+    scale = 1.0 / np.where(is_met, weight, 1.0)
     rho = np.full(count, np.inf)
     np.minimum.at(rho, place[w > 0.0], pairs.rho[w > 0.0])
     mean = scale * total(pairs.distance)
     spread = scale * total(np.square(pairs.distance - mean[place]))
-    shares = np.bincount(place, np.square(w * scale[place]), count)
-    least = spread * shares / np.maximum(1.0 - shares, shares)
+    squares = scale * total(w * scale[place])  # Sums of squared shares: 1 over the effective number.
+    least = spread * squares / np.maximum(1.0 - squares, squares)  # A single patch has no spread.
     variance = np.maximum(scale * total(np.square(pairs.std)) - spread, least)
     up = normalized(np.stack([total(pairs.normal[:, i]) for i in range(3)], axis=1))
     best = argmin_per_point(place, -w, count)

@@ -52,20 +52,22 @@ class Finger(NamedTuple):
         return None
 
     def disk(self, point: Vector, normal: Vector, tangent: Vector, radius: float) -> Array:
-        """A contact and those on a disk around it, (k, 2, 3), which measure how much surface there is.
+        """A contact, and those felt from above on a disk around it: points and normals, (k, 2, 3).
+
+        Places behind a wall and surface that faces away are left out.
 
         tangent : not along the normal; the disk's places are turned from it
         """
         down, above = scaled(normal, -1.0), along(point, normal, HAIR * radius)
         roof = self.surface.ray_cast(above, normal, ABOVE * radius)
         height = ABOVE * radius if roof is None else 0.5 * math.dist(point, roof[0])
-        hits, middle, far = [(point, normal)], along(point, normal, height), height + ABOVE * radius
+        hits, raised, far = [(point, normal)], along(point, normal, height), height + ABOVE * radius
         for way in _disk_around(normal, tangent):
             length = math.hypot(*way)
             # The finger does not get through a wall.
-            if self.surface.ray_cast(middle, scaled(way, 1.0 / length), length * radius) is not None:
+            if self.surface.ray_cast(raised, scaled(way, 1.0 / length), length * radius) is not None:
                 continue
-            felt = self.met(along(middle, way, radius), down, far)
+            felt = self.met(along(raised, way, radius), down, far)
             if felt is not None and dot(felt[1], normal) > FACING:
                 hits.append(felt)
         return np.array(hits)

@@ -42,7 +42,8 @@ def refit(
     """The tables of patches fitted to all contacts on them. Yields the share that is done.
 
     charts : the tables of the same patches, fitted only to their own contacts
-    earlier : number of contacts and table of each patch that was joined before; changed in place
+    earlier : for each patch that was joined before, the number of contacts near it and its table; changed in
+        place. Contacts only come to others, so as many are the same ones
     """
     points, normals, owner = _contacts(contours)
 

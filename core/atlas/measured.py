@@ -34,7 +34,7 @@ from .unfelt import place_at, uncovered_places
 # python -m benchmarks.robot judges these.
 FEWEST = 40  # The smallest patch has this many contacts.
 SOME_PLACES = 24  # The number of places at which patches show the noise.
-WIDENING, WIDENINGS = 1.4, 10  # Patches grow by this factor, at most this often.
+WIDENING, RADII = 1.4, 10  # Patches have one of this number of radii, each larger by the factor.
 # A patch is looked for at contacts that are farther than the first share of its radius from the middles of
 # others, or farther out on them than the second. Where there is none, none is looked for as near as that:
 # otherwise a patch bulges to a single contact that is off (test_measured).
@@ -126,7 +126,7 @@ def _judged(
     """The atlas with its doubts: these, and those of how contacts and surface are off each other; yields 1.
 
     fit_noise : that of the fit, or 0 if one was given
-    radius : the least of a patch
+    radius : the smallest one of a patch
     """
     contacts, mesh, most = cloud.contacts, atlas.reference.mesh, atlas.tolerance or GROWN * radius
     off_surface = partial(_off_surface, atlas, cloud.noise, most)
@@ -449,15 +449,15 @@ class _Cloud(NamedTuple):
         return np.asarray(surface.normal[:, 2] * (z - surface.z))
 
     def fit_noise(self, some: list[int], radius: float) -> float:
-        """The deviation of contacts from patches of this radius at some of them, at least MISFIT of it.
+        """The robust standard deviation of contacts from patches of this radius, at least MISFIT of that.
 
-        Raises ValueError if there are none.
+        some : the contacts (indices) at which patches are tried. Raises ValueError if none has one.
         """
         patches = [(i, r) for i, r in zip(some, self.patches(some, radius), strict=True) if r is not None]
         if not patches:
             raise ValueError(
                 "contacts: expected others all around at least one of them, got "
-                f"{len(self.contacts.points)} without: make strokes nearer to each other"
+                f"{len(some)} that were tried without: make strokes nearer to each other"
             )
         off = np.concatenate([self.distances(r, self.same_sheet(i, radius)) for i, r in patches])
         return max(1.4826 * float(np.median(np.abs(off))), MISFIT * radius)
@@ -466,11 +466,11 @@ class _Cloud(NamedTuple):
 def _patches(cloud: _Cloud, radius: float) -> Generator[float, None, tuple[list[Reconstruction], Charts]]:
     """Patches and their tables, as large as they may be, at contacts that no earlier one covers.
 
-    radius : the least of a patch
+    radius : the smallest one of a patch
 
-    Yields the share that is covered.
+    Yields the share of the contacts that are done: covered, or without a sure patch.
     """
-    points, radii, last = cloud.contacts.points, [radius * WIDENING**k for k in range(WIDENINGS)], WIDENINGS
+    points, radii, last = cloud.contacts.points, [radius * WIDENING**k for k in range(RADII)], RADII
     left, patches, tables = np.ones(len(points), dtype=bool), [], []
     for i in range(len(left)):
         if not left[i]:

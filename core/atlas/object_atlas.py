@@ -31,7 +31,7 @@ from .samples import indicated
 # Edges that are chosen by the curvature are between these shares of the size, those for thin walls above the
 # last one.
 FINE, SHARE, FINEST = 1.0 / 160.0, 1.0 / 60.0, 4e-3
-LIMIT, ROUGH = 1.5, 0.01  # At most this share of the surface has a deviation above this many tolerances.
+LIMIT, ROUGH = 1.5, 0.01  # Deviations are above LIMIT tolerances on at most the share ROUGH of the surface.
 # What is off the surface by more tolerances is of something else: a patch ends there, and a contact
 # contradicts the surface if it is off by so many deviations, too.
 NEAR, OFF_STDS = 3.0, 5.0
@@ -203,7 +203,7 @@ class Atlas(Judged):
 
     @cached_property
     def _rough(self) -> tuple[float, int]:
-        """The share of the surface less certain than LIMIT tolerances, and the least certain vertex."""
+        """The share of the surface less certain than LIMIT tolerances; the least certain vertex, or -1."""
         mesh = self.reference.mesh
         if self.tolerance is None or not len(mesh.triangles):
             return 0.0, -1
@@ -287,7 +287,7 @@ class Atlas(Judged):
     def distance(self, points: ArrayLike) -> tuple[Array, Array]:
         """Signed distances (n,) of points (n, 3), negative inside, and their standard deviations (n,).
 
-        Far from the surface it is the distance of the nearest place on it. If that is on an open rim,
+        It is the distance of the nearest place on the surface. If that is on an open rim,
         something unfelt might be nearer, and the deviation is inf.
         """
         p = finite_array("points", points, (None, 3), LARGEST)

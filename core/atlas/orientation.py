@@ -32,7 +32,7 @@ SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this m
 DOUBTED = 0.02  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
 FACING = 0.8  # Contacts face one way, or opposite ways, if their normals do by this cosine.
 CLOSED = 0.15  # Contacts show their outer side if the mean of their winding numbers is more.
-DECISIVE = 0.3  # A hint decides if the mean cosine between it and the normals is more.
+DECISIVE = 0.3  # Against winding numbers a hint decides if its mean cosine to the normals is more.
 SMALL = 0.1  # Together at least this share of the contacts is turned,
 CLEAR = 0.5  # by which the square by which winding numbers are off a half falls so much for each of them.
 PROBES = 300  # Winding numbers are computed at this many contacts.
@@ -209,15 +209,16 @@ def _off_half(numbers: Array) -> Array:
     return (numbers**2).mean(axis=0) - np.abs(numbers.mean(axis=0))
 
 
-def _global_sign(normals: Array, known: Array | None, up: Array | None, number: float) -> float:
-    """1, or -1 if normals (n, 3) face inward, as measured normals, a hint or the winding number have it.
+def _global_sign(normals: Array, known: Array | None, up: Array | None, winding: float) -> float:
+    """1, or -1 if normals (n, 3) face inward, as measured normals or a hint `up` have it.
 
-    Raises ValueError if nothing of these is decisive.
+    Without measured normals they face outward already if the mean winding number shows a closed surface,
+    unless the hint is DECISIVE; else any hint decides. Raises ValueError without one.
     """
     if known is not None and known.any():
         return float(np.copysign(1.0, row_dot(known, normals).sum()))
     mean = 0.0 if up is None else float((normals @ up).mean())
-    if number > CLOSED and abs(mean) < DECISIVE:
+    if winding > CLOSED and abs(mean) < DECISIVE:
         return 1.0
     if up is None:
         raise ValueError(

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from ..contours.contour import vector_of
 from ..reconstruction.result import Reconstruction
+from ..triangles import normalized
 from .charts import AZIMUTHS
 from .finger import Finger
 from .join import FARTHEST_RIM
@@ -26,7 +27,7 @@ OUTER = FARTHEST_RIM * 1.12 ** np.arange(1, 7)  # and at these where the wall is
 FLAT = 3.0  # It is flat where the finger is nearer to the continued patch by this factor than it has to be.
 HALVINGS = 5  # This many halvings find where a patch ends,
 LEAST_RIM = 0.002  # which is at least this share of its largest radius away.
-STEEP = 0.6  # A patch ends where it is steeper, this cosine to its own plane.
+LEAST_COSINE = 0.6  # A patch ends where its normal has a lesser cosine to that at its point.
 INWARD = 0.98  # A corner is felt at this share of its radius.
 NARROWEST = 5.0  # A patch reaches at most this many times its width.
 SLOPE = 1e-3  # Slopes are differences over this share of the radius.
@@ -100,14 +101,17 @@ def _extents(r: Reconstruction, finger: Finger, near: float, rays: Array) -> tup
 
 
 def _offsets(r: Reconstruction, finger: Finger, near: float, xy: Array) -> Array:
-    """How far the surface is from a patch at local places (2, k), (k,); inf where the finger feels none."""
+    """How far the surface is from a patch at local places (2, k), (k,), lengths.
+
+    It is inf where the finger feels none within the length `near`, and where the patch is too steep.
+    """
     x, y, step = *xy, SLOPE * r.radius
     z, right, ahead = r.height(np.append(x, [x + step, x]), np.append(y, [y, y + step])).reshape(3, -1)
     up = np.stack([z - right, z - ahead, np.full(len(z), step)], axis=1) @ r.frame.axes.T
-    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    up = normalized(up)
     offsets = np.full(len(z), np.inf)
     places = r.frame.to_world(np.stack([x, y, z], axis=1)).tolist()
-    for i in np.flatnonzero(up @ r.frame.axes[:, 2] > STEEP):
+    for i in np.flatnonzero(up @ r.frame.axes[:, 2] > LEAST_COSINE):
         contact = finger.near(vector_of(places[i]), vector_of(up[i]), near)
         offsets[i] = math.inf if contact is None else math.dist(places[i], contact[0])
     return offsets

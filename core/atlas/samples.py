@@ -15,27 +15,31 @@ from ..contours.contour import vector_of
 from ..contours.finger import Surface
 from ..steps import chunked
 from ..triangles import row_dot
-from .charts import PLACES_AT_ONCE, STEEPEST, Charts
-from .field import facing_alike, node_weights, weights_of
+from .charts import LEAST_COSINE, PLACES_AT_ONCE, Charts
+from .field import facing_alike, patch_weights, weights_of
 from .indicator import LAYERS, Indicator, solve_poisson
 
 # python -m benchmarks.atlas judges these.
 PITCH = 1.2  # Samples of a patch are this many cells apart.
-# The weights of other patches are computed once for up to PARTS^2 samples; a patch has ACROSS^2 or more.
+# The weights of other patches are computed once for up to PARTS^2 samples. The square around a patch has
+# ACROSS^2 or more.
 ACROSS, PARTS = 12, 8
-DENSER = 0.5  # Where walls need cells finer than this share, samples are taken again.
+DENSER = 0.5  # If walls need cells finer than this share of those for samples, these are taken again.
 FINEST, COARSEST = 1.0 / 400.0, 1.0 / 80.0  # Cells are between these shares of the size.
 TOLERANCES = 5.0  # A cell is at most this many tolerances.
 OPPOSITE = -0.9  # Two patches are the sides of a wall or gap if the cosine between their normals is less.
-THIN_SHARE = 0.003  # Walls are at least as thick as all but this share of the area is.
+THIN_SHARE = 0.003  # Walls are at least that thick over all but this share of the area.
 BELOW = 1e-5  # Rays across walls begin this share of the size below the surface.
 CERTAIN = 5.0  # Two sides that are nearer than this many deviations are no wall or gap.
 PATCHES_AT_ONCE = 20  # A step takes this many patches.
 
 
 def indicated(charts: Charts, tolerance: float | None) -> Generator[float, None, Indicator]:
-    """The indicator of patches that are as certain as a tolerance, or None; yields 0 between its steps."""
-    reach = charts.radii[:, None] * charts.rims.max(axis=1)[:, None]
+    """The indicator of the surface of patches; yields 0 between its steps.
+
+    tolerance : mean standard deviation of the heights up to which patches grew; None without one
+    """
+    reach = (charts.radii * charts.widths)[:, None]
     size = float(((charts.origins + reach).max(axis=0) - (charts.origins - reach).min(axis=0)).max())
     cell = min(COARSEST * size, np.inf if tolerance is None else TOLERANCES * tolerance)
     pitch = PITCH * max(cell, FINEST * size)
@@ -70,11 +74,13 @@ class Samples(NamedTuple):
 
 
 def samples_of(charts: Charts, pitch: float) -> Generator[float, None, Samples]:
-    """Points of all patches at most `pitch` apart, with the share of the area there that is theirs; yields 0.
+    """Points of all patches, at most `pitch` apart along their tangent planes, and their parts of the area.
+
+    Yields 0 between its steps.
 
     The weights of other patches are smooth over a patch, so they are computed once for many samples.
     """
-    half = charts.rims.max(axis=1)
+    half = charts.widths
     across = np.maximum(ACROSS, np.ceil(2.0 * half * charts.radii / pitch).astype(np.intp))
     patch, x, y, middle, group = yield from _sample_grid(charts, half, across)
     others, thickness = yield from chunked(
@@ -85,8 +91,8 @@ def samples_of(charts: Charts, pitch: float) -> Generator[float, None, Samples]:
         x[middle],
         y[middle],
     )
-    flat = ((2.0 * half * charts.radii / across) ** 2)[patch]
-    columns = patch, x, y, flat, others[group], thickness[group]
+    cell_areas = ((2.0 * half * charts.radii / across) ** 2)[patch]
+    columns = patch, x, y, cell_areas, others[group], thickness[group]
     return Samples._make((yield from chunked(partial(_samples, charts), PLACES_AT_ONCE, 0.0, *columns)))
 
 
@@ -123,35 +129,39 @@ def _sample_grid(
 def _overlap_weight_and_thickness(
     charts: Charts, patch: NDArray[np.intp], x: Array, y: Array
 ) -> tuple[Array, Array]:
-    """Sums of the weights of other patches of the sheet at local (x, y) of patches, (n,).
+    """Sums (n,) of the weights of other patches on the same sheet, at local (x, y) (n,) of patches.
 
     Also the thickness of the wall or gap between the sheet and what faces the other way, (n,).
     """
     points, normals = charts.world(patch, x, y)
     pairs, count = charts.pairs(points), len(points)
     up, radius = normals[pairs.point_index], charts.radii[patch[pairs.point_index]]
-    alike = facing_alike(charts, pairs, up, np.zeros(len(up)), radius) * (
+    alike = facing_alike(charts, pairs, up, offset=np.zeros(len(up)), radius=radius) * (
         pairs.patch != patch[pairs.point_index]
     )
-    others: Array = np.bincount(pairs.point_index, node_weights(charts, pairs) * alike, count).astype(
-        np.float64
-    )
+    weights = np.bincount(pairs.point_index, patch_weights(charts, pairs) * alike, count)
     opposite = (row_dot(pairs.normal, up) < OPPOSITE) & (pairs.rho < 1.0)
     opposite &= np.abs(pairs.distance) > CERTAIN * pairs.std
     thickness = np.full(count, np.inf)
     np.minimum.at(thickness, pairs.point_index[opposite], np.abs(pairs.distance[opposite]))
-    return others, thickness
+    return weights.astype(np.float64), thickness  # Without pairs bincount returns integers.
 
 
 def _samples(
-    charts: Charts, patch: NDArray[np.intp], x: Array, y: Array, flat: Array, others: Array, thickness: Array
+    charts: Charts,
+    patch: NDArray[np.intp],
+    x: Array,
+    y: Array,
+    cell_areas: Array,
+    others: Array,
+    thickness: Array,
 ) -> Samples:
-    """Samples of patches at local (x, y); `flat` are their areas in the tangent planes."""
+    """Samples of patches at local (x, y); `cell_areas` are in the tangent planes."""
     points, normals = charts.world(patch, x, y)
-    share, steep = charts.shares(x, y, patch), row_dot(normals, charts.axes[patch, :, 2])
-    inside = steep > STEEPEST
-    own = weights_of(share, charts.radii[patch] * charts.stds_at(x, y, patch) * steep, charts.radii[patch])
-    areas = flat * own / (own + others) / np.maximum(steep, STEEPEST)
+    share, cosine = charts.shares(x, y, patch), row_dot(normals, charts.axes[patch, :, 2])
+    inside = cosine > LEAST_COSINE
+    own = weights_of(share, charts.radii[patch] * charts.stds_at(x, y, patch) * cosine, charts.radii[patch])
+    areas = cell_areas * own / (own + others) / np.maximum(cosine, LEAST_COSINE)
     return Samples(*(values[inside] for values in (points, normals, areas, thickness)))
 
 

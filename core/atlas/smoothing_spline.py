@@ -204,16 +204,15 @@ def _heights_at_coarse_knots() -> Array:
 
 @cache
 def penalty() -> Array:
-    """The band of the sum of squares of all derivatives of the ORDER, by differences, for knots 1 apart."""
+    """The lower band of P, flat: c' P c is the sum of squares of all differences of ORDER of coefficients c.
+
+    Mixed ones count as often as they occur.
+    """
     from scipy.sparse import csr_matrix, kron
 
-    steps = [csr_matrix(np.diff(np.eye(SIDE), k, axis=0)) for k in range(ORDER + 1)]
-    return _band(
-        sum(
-            comb(ORDER, k) * kron(a.T @ a, b.T @ b)
-            for k, (a, b) in enumerate(zip(steps[::-1], steps, strict=True))
-        )
-    )
+    differences = (csr_matrix(np.diff(np.eye(SIDE), k, axis=0)) for k in range(ORDER + 1))
+    squares = [d.T @ d for d in differences]
+    return _band(sum(comb(ORDER, k) * kron(squares[ORDER - k], squares[k]) for k in range(ORDER + 1)))
 
 
 def _band(matrix: Any) -> Array:

@@ -84,7 +84,7 @@ def touch_all_over(
     """Does what `explore_object` does in steps: yields a Progress after each, and returns the Atlas.
 
     earlier : touches of the same surface that were found before, from which these go on in place of the
-        point; they count as touches
+        point, if one of them is as certain as the tolerance; they count as touches
 
     If it is sent anything false other than None, it stops touching and joins the patches so far. Arguments
     and errors are those of `explore_object`; errors are raised in the first step.
@@ -99,8 +99,8 @@ def touch_all_over(
         raise ValueError(f"tolerance: expected the noise {noise:g} or more, got {tolerance:g}")
     options = ExplorationOptions(noise=noise, rng=generator, largest_std=tolerance)
     frame = earlier[0].result.frame if earlier else None
-    at, above = (p, up) if frame is None else (frame.origin, frame.axes[:, 2])
-    finger = finger_at(surface, vector_of(at), vector_of(above), SMALL * tolerance)
+    origin, normal = (p, up) if frame is None else (frame.origin, frame.axes[:, 2])
+    finger = finger_at(surface, vector_of(origin), vector_of(normal), SMALL * tolerance)
     run = _Run(finger, tolerance, most, options)
     yield from run.taking_up(earlier)
     if not run.found:
@@ -185,10 +185,13 @@ class _Run:
         return Progress(self.done, len(self.frontier.queue), tuple(new), joining, tuple(rims))
 
     def touching(
-        self, contacts: Sequence[PointNormal], farthest: float
+        self, places: Sequence[PointNormal], farthest: float
     ) -> Generator[None, None, list[Exploration]]:
-        """Touches at contacts; returns those that succeed, and adds their rims to the frontier."""
-        points, outward = (np.array(values) for values in zip(*contacts, strict=True))
+        """Touches at places; returns those that succeed, and adds their rims to the frontier.
+
+        farthest : the greatest length of a half curve. Failures are counted as done, too
+        """
+        points, outward = (np.array(values) for values in zip(*places, strict=True))
         results = yield from exploring_many(
             self.surface, points, outward, replace(self.options, farthest=farthest)
         )
@@ -205,7 +208,7 @@ class _Run:
             else:
                 self.frontier.failed_points.append(vector_of(point))
         self.found += new
-        self.done += len(contacts)
+        self.done += len(places)
         return new
 
     def joining(self, earlier: dict[int, tuple[int, Table]]) -> Generator[float, None, Charts]:
@@ -215,20 +218,22 @@ class _Run:
         yield 0.0
         return (yield from refit(contours, results, self.frontier.charts, self.options.noise, earlier))
 
-    def going_on(self, contacts: Sequence[PointNormal], farthest: float) -> Generator[Progress, object, None]:
-        """Touches at contacts, and all over from there.
+    def going_on(self, places: Sequence[PointNormal], farthest: float) -> Generator[Progress, object, None]:
+        """Touches at places, and all over from there.
 
-        Of contacts that are near each other only the first is touched, unless its patch leaves others out.
+        Of places that are near each other only the first is touched, unless its patch leaves others out.
+
+        farthest : the greatest length of a half curve
         """
-        points, normals = (np.array(values) for values in zip(*contacts, strict=True))
-        left, first = np.arange(len(points)), len(self.found)
+        points, normals = (np.array(values) for values in zip(*places, strict=True))
+        left, old = np.arange(len(points)), len(self.found)
         while len(left) and self.done < self.most and not self.is_stopped:
             few = left[far_apart(points[left], AGAIN_APART * farthest)]
             few = few[: min(SIDE_BY_SIDE, self.most - self.done)]
             some = list(zip(points[few], normals[few], strict=True))
             new = yield from self.showing(self.touching(some, farthest))
             left = np.setdiff1d(left, few)
-            left = left[~covered(self.frontier.charts, points[left], normals[left], AGAIN_APART, first)]
+            left = left[~covered(self.frontier.charts, points[left], normals[left], AGAIN_APART, first=old)]
             yield from self.show(self.now(new=new))
         yield from _all_over(self)
 
@@ -258,7 +263,7 @@ class _Run:
         """
         charts = yield from part_of(self.joining(earlier), 0.0, 0.5)
         patches, self.void = tuple(e.result for e in self.found), []
-        reference = yield from part_of(joined_surface(patches, charts, self.tolerance, self.off), 0.5, 1.0)
+        reference = yield from part_of(joined_surface(patches, charts, self.tolerance, self.felt), 0.5, 1.0)
         yield 1.0
         assert reference.unfelt is not None
         unfelt = yield from self.frontier.unfelt(reference.unfelt)
@@ -275,25 +280,26 @@ class _Run:
         atlas = Atlas(
             patches, charts, reference, self.tolerance, places, check, taps, border, self.done >= self.most
         )
-        off = atlas.improvable
+        improvable = atlas.improvable
         yield 1.0
         atlas = yield from atlas.widened()
         contacts: list[PointNormal] = [contact for _, contact in uncovered]
-        contacts += zip(check.points[off], check.normals[off], strict=True)
+        contacts += zip(check.points[improvable], check.normals[improvable], strict=True)
         return atlas, contacts + (self.uncertain_contacts(atlas.reference.mesh) if atlas.is_rough else [])
 
-    def off(self, points: Array, normals: Array) -> Array:
-        """How far the object is off places (n, 3) with normals (n, 3), (n,); inf beyond the tolerance.
+    def felt(self, points: Array, normals: Array) -> Array:
+        """How far the object is off places (n, 3) of the closed surface along their normals (n, 3), (n,).
 
-        What the closed surface spans within the tolerance needs no touch.
+        It is inf where nothing is within the tolerance, and these places are added to `void`. Where something
+        is, the closed surface is as near as a touch would have it.
         """
         places = [(vector_of(p), vector_of(n)) for p, n in zip(points, normals, strict=True)]
         contacts = [self.frontier.finger.near(*place, self.tolerance, FACING) for place in places]
         self.void += [place for place, contact in zip(places, contacts, strict=True) if contact is None]
-        return np.array([
-            math.inf if contact is None else math.dist(place[0], contact[0])
-            for place, contact in zip(places, contacts, strict=True)
-        ])  # fmt: skip
+        pairs = zip(places, contacts, strict=True)
+        return np.array(
+            [math.inf if contact is None else math.dist(p, contact[0]) for (p, _), contact in pairs]
+        )
 
     def uncertain_contacts(self, mesh: Mesh) -> list[Contact]:
         """Contacts where the surface is less certain than LIMIT tolerances, apart from each other.

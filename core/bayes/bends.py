@@ -41,13 +41,13 @@ class Bends(NamedTuple):
 
     second : (3, c), the second derivatives of x^2, xy and y^2 along each of c curves
     stds : (c,), deviations of the curvatures along these that too few bends leave, in unit radius
-    contacts : how many contacts share a bend, 1 or more
-    folded : the largest mean curvature beyond even ones of a curve of fewer than FEW_BENDS, in unit radius
+    contacts_per_bend : how many contacts share a bend, 1 or more
+    folded : the largest |sum of turns beyond even ones| / H of a curve of fewer bends than FEW_BENDS
     """
 
     second: Array
     stds: Array
-    contacts: float
+    contacts_per_bend: float
     folded: float
 
     def with_few(self, covariance: Array) -> Array:
@@ -64,27 +64,30 @@ class Bends(NamedTuple):
         return both
 
 
-def bends_of(contours: Sequence[Contour], frame: Frame, radius: float, noise: float, terms: Array) -> Bends:
+def bends_of(
+    contours: Sequence[Contour], frame: Frame, radius: float, noise: float, quadratic: Array
+) -> Bends:
     """The bends along contours, by their normals or else by the chords between their contacts.
 
     noise : of a contact without normals, in unit radius
-    terms : (3,), the patch's coefficients of x^2, xy and y^2 in unit radius
+    quadratic : (3,), the patch's coefficients of x^2, xy and y^2 in unit radius
 
     Along a curve, the surface turns by d over each step h from contact to contact. With H = sum h these count
     as M = n (sum |d|)^2 / (H sum d^2 / h) bends: n if the turns of the n steps are as their lengths, and one
     if there is a single one of n even steps. The turns beyond even ones, which the steps around each show,
-    count likewise: to the share of few bends they make the difference between the curvature of the patch and
-    the even one at the point, or at least their mean.
+    count likewise, as M'. The deviation of a curve is a factor, which falls with M', times the difference
+    between the curvature of the patch and the even one at the point. That counts as at least |sum of the
+    turns beyond even ones| / H, and at most as the largest that these allow.
     """
     kinds = [
         [c for c in contours if (c.normals is None) is bare and len(c.points) > 2] for bare in (False, True)
     ]
     of_kinds = [_bends(_turns(kind, frame, radius, noise)) for kind in kinds if kind]
-    x, y, turned, contacts, shares, mean, most, even = np.concatenate([np.empty((8, 0)), *of_kinds], axis=1)
+    x, y, turned, contacts, factors, mean, most, even = np.concatenate([np.empty((8, 0)), *of_kinds], axis=1)
     second = 2.0 * np.array([x * x, x * y, y * y])
-    stds = shares * np.clip(np.abs(terms @ second - even), mean, most)
+    stds = factors * np.clip(np.abs(quadratic @ second - even), mean, most)
     sharing = float(turned @ contacts) / max(float(turned.sum()), SMALLEST)
-    return Bends(second, stds, max(sharing, 1.0), float(mean[shares > 1.0].max(initial=0.0)))
+    return Bends(second, stds, max(sharing, 1.0), float(mean[factors > 1.0].max(initial=0.0)))
 
 
 class _Turns(NamedTuple):

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import Array
-from ..lapack import cholesky_in_place, on_one_thread
+from ..lapack import cholesky_diagonal, on_one_thread
 from .prior import FREE, USUAL_VARIANCES, USUAL_WAVINESS, prior_variances
 
 # Chosen with benchmarks.accuracy.
@@ -81,7 +81,9 @@ def noise_grid(heights: Array, counts: Array, floor: Array) -> Array:
 
 
 def hyperparameters(heights: Array, counts: Array, slopes: Array, floor: Array) -> Hyperparameters:
-    """Waviness and noise, at least `floor` (b,), of b touches without a process: averages over the grid.
+    """Prior variances and noise, at least `floor` (b,), of b touches without a process.
+
+    They are means over the grid of the variances and of the squared noise, weighted by the likelihood.
 
     heights, counts, slopes : as in `neg2_log_evidence`
 
@@ -173,5 +175,5 @@ def _neg2_log_at(
     diagonal = work.reshape(-1)[:: len(work) + 1]
     diagonal += noise**2
     corner = diagonal[-1] = 2.0 * square / noise**2 + 1.0  # It exceeds y' K^-1 y.
-    pivots = cholesky_in_place(work)
+    pivots = cholesky_diagonal(work)
     return 2.0 * float(np.log(pivots[:-1]).sum()) + corner - float(pivots[-1]) ** 2

@@ -183,12 +183,15 @@ def posteriors_of(
     """What `posterior_of` gives for b different weights (b, n) of the contacts.
 
     by_evidence : whether waviness and noise follow from the contacts. If not, they are the usual waviness and
-        the given noise, which is quick
+        the given noise, or MISFIT if that is more, which is quick
+
+    k1, k2 : those of the prior's mean
     """
     b = len(weights)
-    expected, local = prior_mean(np.full(b, k1), np.full(b, k2)), contacts[None].repeat(b, axis=0)
+    expected = prior_mean(np.array([k1]), np.array([k2])).repeat(b, axis=0)
+    local = contacts[None].repeat(b, axis=0)
     floor, usual = np.full(b, max(noise, MISFIT)), USUAL_VARIANCES[None].repeat(b, axis=0)
-    data = sextics(local, weights, expected, local[:, :0], point_std / floor)
+    data = sextics(local, weights, expected, normals=local[:, :0], point_std=point_std / floor)
     hyper = data.hyperparameters(floor) if by_evidence else Hyperparameters(usual, floor)
     return posterior_given(expected + mean_given(data, hyper), data, hyper)
 

@@ -78,10 +78,11 @@ def derived_kernel(p: Array, places: Array, variances: Array) -> Array:
 
 
 def _derived_matern(apart: Array, length: float) -> Array:
-    """M(|apart| / length) for (..., 2) and its derivatives, (6, ...), in the order of PARTIALS."""
+    """M(|apart| / length) for (..., 2), and its derivatives by apart: (6, ...), 1, x, y, xx, xy and yy."""
     x, y = np.moveaxis(apart, -1, 0)
     a, b = math.sqrt(3.0) / length * np.hypot(x, y), 3.0 / length**2
-    slope = -b * np.exp(-a)
-    height = (1.0 + a) * np.exp(-a)
-    bend = -b * slope / np.maximum(a, 1e-300)  # It is multiplied by less than a^2.
-    return np.array([height, slope * x, slope * y, slope + bend * x**2, bend * x * y, slope + bend * y**2])
+    decay = np.exp(-a)
+    # M' / r, and its derivative over r, which is multiplied by x^2, x y or y^2, at 0 by 0.
+    first, second = -b * decay, b**2 * decay / np.maximum(a, 1e-300)
+    hessian = first + second * x**2, second * x * y, first + second * y**2
+    return np.array([(1.0 + a) * decay, first * x, first * y, *hessian])

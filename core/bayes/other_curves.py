@@ -42,11 +42,14 @@ def contradicting_curve(
 
 
 def _most_off(contacts: Array, others: Array, posteriors: SurfacePosterior) -> tuple[float, float]:
-    """The medians for the curve that is off by most deviations, given those of `others` (b, n) for each."""
+    """By how many deviations, and by what height, the curve that is most off is off the others: medians.
+
+    others : (b, n), for each curve the weights of contacts, 0 for its own
+    """
     reach, medians = np.hypot(contacts[:, 0], contacts[:, 1]), []
     for i, weights in enumerate(others):
-        own = reach * (weights == 0.0)
-        outer, predicted = contacts[own > OUTER * own.max()], posteriors.at(i)
+        own_reach = reach * (weights == 0.0)
+        outer, predicted = contacts[own_reach > OUTER * own_reach.max()], posteriors.at(i)
         off = outer[:, 2] - predicted.height(*outer[:, :2].T)
         std = np.hypot(predicted.height_std(*outer[:, :2].T), predicted.noise)
         medians.append((abs(float(np.median(off / std))), abs(float(np.median(off)))))

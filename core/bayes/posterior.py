@@ -7,7 +7,8 @@ Not in the paper; after Rasmussen and Williams (2006), section 2.7. In unit radi
     z = phi' b + g,
 
 where phi are the terms of degree 1 to 6, b has the prior of prior.py, and g has zero mean and the covariance
-of kernel.py. Where the evidence does not favor g, z is a polynomial.
+of kernel.py. With g, b has the mean 0 and variances of at most MOST_VARIANCE (evidence.py). Where the
+evidence does not favor g, z is a polynomial.
 """
 
 import math
@@ -377,10 +378,10 @@ def _rows(x: ArrayLike, y: ArrayLike) -> Array:
 
 @cache
 def _projection() -> tuple[Array, Array]:
-    """Points (n, 2) and weights (27, n) that take heights there to coefficients of the nearest polynomial.
+    """Points (n, 2) and weights (27, n) that take heights there to coefficients of a polynomial near these.
 
-    Terms up to degree 2 are those of the nearest quartic over the disk of QUARTIC_SHARE. The other terms are
-    nearest to what these leave over DISK.
+    Terms up to degree 2 are those of the quartic of least squares over the disk of QUARTIC_SHARE, without its
+    constant. The other terms are those of least squares of what these leave over DISK.
     """
     whole, shares = nodes()
     root, count = np.sqrt(shares), len(shares)
@@ -389,7 +390,7 @@ def _projection() -> tuple[Array, Array]:
     basis = monomials(whole, TERMS)
     rest = np.linalg.pinv(root[:, None] * basis[:, FREE:]) * root
     first = np.hstack([quartic[:FREE], np.zeros((FREE, count))])
-    left = np.eye(count, 2 * count, count) - basis[:, :FREE] @ first
+    left = np.hstack([np.zeros((count, count)), np.eye(count)]) - basis[:, :FREE] @ first
     return np.vstack([near, whole]), np.vstack([first, rest @ left])
 
 

@@ -139,7 +139,10 @@ def _is_texture(off: Array, noise: float) -> bool:
 def _mean_given(
     data: ProcessData, hyper: Hyperparameters, rows: Array, kernels: list[Array]
 ) -> tuple[Array, Array]:
-    """The mean (27,) of the terms, and alpha (m,), of a SurfacePosterior, by one Cholesky factor.
+    """The mean (27,) of the coefficients, and alpha (m,), of a SurfacePosterior.
+
+    One Cholesky factor (Rasmussen and Williams 2006, 2.7) is enough if each contact is a place and no normal
+    is measured.
 
     rows, kernels : of `at_places`
     """

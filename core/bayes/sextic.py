@@ -55,7 +55,7 @@ class Sextics(NamedTuple):
     def hyperparameters(
         self, floor: Array, which: slice | NDArray[np.bool_] = slice(None)
     ) -> Hyperparameters:
-        """Waviness and noise of some of the touches, of which the latter is at least `floor` (b,)."""
+        """Prior variances and noise, at least `floor` (b,), of some of the touches."""
         return hyperparameters(self.heights[which], self.counts[which], self.slopes[which], floor[which])
 
 
@@ -108,14 +108,17 @@ def mean_given(data: Sextics, hyper: Hyperparameters) -> Array:
 
 
 def with_scatter(data: Sextics, coefficients: Array, normals: Array) -> Sextics:
-    """The equations, where measured normals have at least the deviation by which they are off coefficients.
+    """The equations with the variances of measured normals times their reduced chi^2, if that is above 1.
 
-    Normals (b, n, 3) of a texture scatter about the polynomial by more than their own deviation.
+    It is that about polynomials: where the surface has a texture, its normals (b, n, 3) scatter by more than
+    their own deviation.
+
+    coefficients : (b, 27), less the prior's mean
     """
-    off = np.concatenate([coefficients, np.full((len(coefficients), 1), -1.0)], axis=1)
+    residual = np.pad(coefficients, ((0, 0), (0, 1)), constant_values=-1.0)
     freedom = 2.0 * np.count_nonzero(normals.any(axis=2) & (data.weights > 0.0), axis=1) - FREE
-    spread = np.einsum("bi,bij,bj->b", off, data.slopes, off) / np.maximum(freedom, 1.0)
-    return data._replace(slopes=data.slopes / np.maximum(spread, 1.0)[:, None, None])
+    chi2 = np.einsum("bi,bij,bj->b", residual, data.slopes, residual) / np.maximum(freedom, 1.0)
+    return data._replace(slopes=data.slopes / np.maximum(chi2, 1.0)[:, None, None])
 
 
 def posterior_given(mean: Array, data: Sextics, hyper: Hyperparameters) -> SurfacePosterior:

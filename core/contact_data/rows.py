@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rows of contacts as arrays: many at once, or one by one to find the row that is wrong."""
+"""Rows of contacts as arrays: many at once, or one by one where a row is blank, short or wrong."""
 
 import csv
 import math
@@ -160,8 +160,8 @@ class RowReader:
     def _parse_lines(self, number: int, block: str) -> tuple[list[str], Array]:
         """The labels and numbers (n, k) of a block, line by line. Raises ValueError with line and column."""
         labels, numbers = [], []
-        for place, line in enumerate(block.split("\n"), number):
-            at = f"{self._name}, line {place}"
+        for line_number, line in enumerate(block.split("\n"), number):
+            at = f"{self._name}, line {line_number}"
             fields = fields_of(at, line, self._separator) if is_row(line) else []
             if any(fields):
                 label, values = self._parse_row(at, fields)

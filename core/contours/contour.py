@@ -166,16 +166,16 @@ class Contour:
         set_fields(contour, **vars(self) | values)
         return contour
 
-    def moved(self, scale: float, turn: Array, start: Array, end: Array) -> "Contour":
-        """The contour after a similarity of the world that takes the point `start` to `end`, (3,).
+    def moved(self, scale: float, rotation: Array, start: Array, end: Array) -> "Contour":
+        """The contour moved by p -> end + scale R (p - start), where R is a rotation (3, 3).
 
         If `start` is one of its points, `end` is exactly one of the new points, in spite of rounding.
         """
         return replace(
             self,
-            points=end + scale * (self.points - start) @ turn.T,
-            plane_normal=None if self.plane_normal is None else turn @ self.plane_normal,
-            normals=None if self.normals is None else self.normals @ turn.T,
+            points=end + scale * (self.points - start) @ rotation.T,
+            plane_normal=None if self.plane_normal is None else rotation @ self.plane_normal,
+            normals=None if self.normals is None else self.normals @ rotation.T,
             noise=None if self.noise is None else scale * self.noise,
             ball=None if self.ball is None else scale * self.ball,
         )

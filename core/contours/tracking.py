@@ -32,7 +32,7 @@ def track(
 
     point, outward : (3,), the reference point and the outward normal; a sheet can be touched from either side
     planes : azimuths are measured from `tangent`, see SamplingPlane.axes
-    extent, step : lengths along the curve, of each half and between contacts
+    extent, step : lengths of each half curve, as a sum of chords, and of a chord between contacts
     noise : standard deviation of the sensor, in the plane and along the curve's normal; drawn from `rng`
 
     Returns one Contour for each plane, from azimuth + 180 degrees to azimuth, which contains the exact point.
@@ -128,15 +128,15 @@ def _extended(curve: _Curve, count: int, generator: np.random.Generator) -> Cont
 
 
 def _next_contacts(half: _Half, count: int) -> list[tuple[Vector, Vector]]:
-    """The contacts, with normals, by which a half contour grows to `count`, or fewer where it ends."""
-    contacts: list[tuple[Vector, Vector]] = []
+    """The contacts, with normals, by which a half contour now grows to `count`, or fewer where it ends."""
+    felt: list[tuple[Vector, Vector]] = []
     while half.stop == EXTENT and half.count < count:
         try:
-            contacts.append(next(half.contacts))
+            felt.append(next(half.contacts))
             half.count += 1
         except StopIteration as end:
             half.stop = end.value
-    return contacts
+    return felt
 
 
 def generator_of(rng: np.random.Generator | int | None) -> np.random.Generator:

@@ -268,14 +268,15 @@ def _is_sure(r: Reconstruction, options: ExplorationOptions) -> bool:
 
 
 def _explains(explored: Exploration, options: ExplorationOptions) -> bool:
-    """Whether the patch explains the contacts of its contours, or is within the largest deviation of them."""
+    """Whether few contacts are off the patch by more than noise, its deviation and `largest_std`."""
     r = explored.result
     x, y, z = r.frame.to_local(np.concatenate([contour.points for contour in explored.contours])).T
     off, noise = z - r.height(x, y), max(options.noise, float(r.posterior.noise) * r.radius)
     far = too_far(off, noise) & (np.abs(off) > (options.largest_std or 0.0))
-    if far.any():  # Noise alone explains most contacts.
+    if far.any():  # The deviation is slow, so it is found only where noise does not explain a contact.
         far[far] = too_far(off[far], np.hypot(r.height_std(x[far], y[far]), noise))
-    return are_few(far, np.append(far[1:], False))
+    curve = np.repeat(range(len(explored.contours)), [len(contour.points) for contour in explored.contours])
+    return are_few(far, np.append(far[1:] & (curve[1:] == curve[:-1]), False))
 
 
 def _most_in_half(contours: Sequence[Contour], point: Array) -> int:

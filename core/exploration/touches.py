@@ -58,11 +58,11 @@ def explore(
 ) -> Exploration:
     """Tracks `surface` from `point` and reconstructs the patch, as large and as densely felt as it needs.
 
-    planes : as in `track`, or how many, k: then their azimuths are pi i / k
+    planes : as in `track`, or how many, k, 3 to 24: then their azimuths are pi i / k
     farthest : greatest length of a half curve; None for no limit, if curves end by themselves
     largest_std : mean deviation of the height that a sure patch has at most; half curves also end where the
       surface bends by 40 degrees. With None the finger also taps between the curves (taps.py): where the
-      surface is not that of the fit, it is in doubt, or with the extent "auto" shorter curves are tried
+      surface is not that of the fit, the patch is in doubt; with the extent "auto" shorter curves are tried
     tolerance : mean deviation of the height to reach: until then the plane that helps most is added, up to
         `most_planes`, as long as one takes a tenth off. None adds no planes
     extent : length of each half curve, as in `track`; with "auto" the longest whose default fit is sure

@@ -128,15 +128,15 @@ def _newton_step(
     Returns a, at and value after the step, and the damping of the next one. The Hessian H may be indefinite,
     so the eigenvalues of W' H W count by their absolute values.
     """
-    curvatures, axes = np.linalg.eigh(whitening.T @ objective.hessian(at, rounding) @ whitening)
-    axes = whitening @ axes
-    along = objective.gradient(at, rounding) @ axes
+    eigenvalues, directions = np.linalg.eigh(whitening.T @ objective.hessian(at, rounding) @ whitening)
+    directions = whitening @ directions
+    along = objective.gradient(at, rounding) @ directions
     while True:
-        lengths = along / (np.maximum(np.abs(curvatures), 1e-9) + damping)
-        trial = a - axes @ lengths
+        lengths = along / (np.maximum(np.abs(eigenvalues), 1e-9) + damping)
+        trial = a - directions @ lengths
         trial_fields = objective.fields(trial)
         trial_value = objective.value(trial_fields, rounding)
-        expected = float(lengths @ (along - 0.5 * curvatures * lengths))
+        expected = float(lengths @ (along - 0.5 * eigenvalues * lengths))
         if trial_value < value:
             quick = value - trial_value > 0.7 * expected
             return trial, trial_fields, trial_value, damping * (0.1 if quick else 2.0)

@@ -81,7 +81,7 @@ class Domain:
     def _polar(self) -> tuple[Array, Array]:
         """Ascending azimuths and the radii of the boundary there."""
         if self._turns_back:
-            azimuths, radii = self._without_turning_back()
+            azimuths, radii = self._monotone_boundary()
         else:  # Equal numbers keep the ends' symmetry.
             x, y = self._along_spline(math.ceil(BOUNDARY_SAMPLES / len(self.ends))).T
             azimuths, radii = np.arctan2(y, x), np.hypot(x, y)
@@ -102,11 +102,11 @@ class Domain:
         before = np.arange(-1, len(x) - 1)
         return bool((x[before] * y <= y[before] * x).any())
 
-    def _without_turning_back(self) -> tuple[Array, Array]:
+    def _monotone_boundary(self) -> tuple[Array, Array]:
         """Azimuths and radii (BOUNDARY_SAMPLES,) of a periodic monotone cubic r(azimuth) through the ends.
 
-        It takes the place of the closed spline where that is not star-shaped, as next to a short end (scipy's
-        PchipInterpolator).
+        It takes the place of the closed spline where that is not star-shaped, as next to an end that is much
+        nearer than others (scipy's PchipInterpolator). `open_ends` do not count.
         """
         from scipy.interpolate import PchipInterpolator
 
@@ -257,15 +257,18 @@ def closed_spline_domain(ends: ArrayLike, radius: float, open_ends: ArrayLike | 
 
 
 def hull_domain(points: ArrayLike, radius: float) -> Domain:
-    """The domain through places on the hull of points (n, 2). Raises ValueError if the origin is outside."""
+    """The domain through places on the hull of points (n, 2), which are not in a line.
+
+    Raises ValueError unless the origin is inside by INSIDE_HULL of the radius.
+    """
     from scipy.spatial import ConvexHull
 
-    # These are outward normals and negative distances.
+    # Outward normals of the sides, and minus their distances from the origin.
     hull = ConvexHull(np.asarray(points, dtype=float)).equations
     turns = 2.0 * np.pi * np.arange(HULL_PLACES) / HULL_PLACES
     rays = np.array([np.cos(turns), np.sin(turns)])
     ahead = hull[:, :2] @ rays
     if hull[:, 2].max() > -INSIDE_HULL * radius:
         raise ValueError("points: expected the origin among them, got it outside them or at their rim")
-    reach = np.where(ahead > 0.0, -hull[:, 2:] / np.maximum(ahead, 1e-300), np.inf).min(axis=0)
+    reach = 1.0 / (ahead / -hull[:, 2:]).max(axis=0)
     return closed_spline_domain((reach * rays).T, radius)

@@ -80,13 +80,18 @@ def _chord_error_scale(surface: HeightField, points: Array) -> Array:
 
 
 def _rim(domain: Domain, size: Size, off: float) -> tuple[Array, float]:
-    """Points (n, 2) on the boundary, even between its corners, and the least size in the domain."""
+    """Points (n, 2) on the boundary, even between its corners; and the least size at samples of the domain.
+
+    Chords between them are about `off` from the boundary, if that takes at most MOST_RIM_EDGES of them.
+    """
     places = 8 * RIM_SAMPLES
     closed = domain.boundary(places)[np.arange(places + 1) % places]
     lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
     corners = domain.corners
     turns = np.arctan2(corners[:, 1], corners[:, 0]) / (2.0 * np.pi) % 1.0
-    bends = np.interp(places * turns, np.arange(places + 1), lengths)  # where along the boundary corners are
+    corner_lengths = np.interp(
+        places * turns, np.arange(places + 1), lengths
+    )  # where along the boundary corners are
 
     def around(at: Array) -> Array:
         """The points of the boundary at these lengths along it."""
@@ -96,17 +101,21 @@ def _rim(domain: Domain, size: Size, off: float) -> tuple[Array, float]:
     along = between * np.arange(RIM_SAMPLES)
     samples = around(along)
     second = np.hypot(*(np.roll(samples, 1, 0) - 2.0 * samples + np.roll(samples, -1, 0)).T)
-    to_corner = np.abs((along[:, None] - bends + 0.5 * lengths[-1]) % lengths[-1] - 0.5 * lengths[-1])
+    to_corner = np.abs(
+        (along[:, None] - corner_lengths + 0.5 * lengths[-1]) % lengths[-1] - 0.5 * lengths[-1]
+    )
     sagitta = 0.5 * second[(to_corner > between).all(axis=1)].max(initial=0.0)
-    rings = np.arange(5)[:, None, None] / 4.0 * samples
-    sizes = size(rings.reshape(-1, 2)).reshape(5, RIM_SAMPLES)
+    inner_samples = np.arange(5)[:, None, None] / 4.0 * samples
+    sizes = size(inner_samples.reshape(-1, 2)).reshape(5, RIM_SAMPLES)
     finest = float(sizes.min())
-    bound = max(RIM_SAMPLES / 2.0 * math.sqrt(sagitta / off), lengths[-1] / (RIM_SPACING * sizes[-1].min()))
-    count = 4 * math.ceil(min(bound, MOST_RIM_EDGES) / 4.0)
+    edges_needed = max(
+        RIM_SAMPLES / 2.0 * math.sqrt(sagitta / off), lengths[-1] / (RIM_SPACING * sizes[-1].min())
+    )
+    count = 4 * math.ceil(min(edges_needed, MOST_RIM_EDGES) / 4.0)
     if not len(corners):
         return around(lengths[-1] / count * np.arange(count)), finest
-    order = np.argsort(bends)
-    steps = _steps_between(bends[order], lengths[-1], count)
+    order = np.argsort(corner_lengths)
+    steps = _steps_between(corner_lengths[order], lengths[-1], count)
     pairs = zip(corners[order], steps, strict=True)
     return np.vstack([part for corner, at in pairs for part in (corner[None], around(at))]), finest
 

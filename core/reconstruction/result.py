@@ -173,14 +173,14 @@ class Reconstruction(Judged):
             std = np.hypot(std, self.posterior.height(u, v) - self.geometry.surface.height(u, v))
         return self.radius * std
 
-    def widening(self, outward: Array) -> Array:
-        """The factor (n,) of a process's deviations at these shares (n,) of the domain's radius.
+    def widening(self, rho: Array) -> Array:
+        """The factor (n,) of a process's deviations at shares (n,) of the domain's radius; 1 without one.
 
-        Near the point, where curves meet, real surfaces are smoother than by their covariance, and near the
-        rim they are rougher. The mean over the domain is 1.
+        Near the point, where curves meet, real surfaces are smoother than the process's covariance has them,
+        and near the rim they are rougher. The mean over the domain is 1.
         """
         near = NEAR_POINT if self.posterior.amplitude else 1.0
-        return near + 1.5 * (1.0 - near) * outward
+        return near + 1.5 * (1.0 - near) * rho
 
     @cached_property
     def mean_height_std(self) -> float:
@@ -255,7 +255,7 @@ class Reconstruction(Judged):
         posterior, covariance = self.posterior, self.posterior.covariance[2:FREE, 2:FREE]
         if not (posterior.sextic or posterior).amplitude:
             # benchmarks.curvatures: scans, facets; exact surfaces
-            covariance = (self.bends.contacts * self._noise_share) ** 2 * covariance
+            covariance = (self.bends.contacts_per_bend * self._noise_share) ** 2 * covariance
         if self.method != "bayes":
             off = posterior.polynomial[2:FREE] - coefficients_of(self.patch.scaled(1.0 / self.radius))[2:FREE]
             covariance = covariance + np.outer(off, off)
@@ -299,14 +299,14 @@ class Reconstruction(Judged):
 
     @cached_property
     def bends(self) -> Bends:
-        """How unevenly the surface bends along the curves."""
+        """In how few places the surface turns along the curves, and what that leaves open of curvatures."""
         fitted = float(self.posterior.noise)
         noises = [fitted if c.noise is None else c.noise / self.radius for c in self.contours]
         contours, most = self.contours, SIGNIFICANT * max(fitted, MISFIT) * self.radius
         if np.abs(self._residuals).max() > most:
             contours = tuple(self._explained(c, most) if c.normals is None else c for c in contours)
-        noise, terms = max(noises, default=0.0), self.posterior.polynomial[2:FREE]
-        return bends_of(contours, self.frame, self.radius, noise, terms)
+        noise, quadratic = max(noises, default=0.0), self.posterior.polynomial[2:FREE]
+        return bends_of(contours, self.frame, self.radius, noise, quadratic)
 
     def _explained(self, contour: Contour, most: float) -> Contour:
         """A contour, without those contacts that are off the surface by more than this length."""

@@ -86,6 +86,8 @@ def _with_processes(
 ) -> _Fit:
     """The joint fit in unit radius; where evidence favors a process, with it and in its frame.
 
+    The contacts of `fit` are moved with its point.
+
     weights, residuals : (b, n), of the contacts
     """
     points, axes, radii, contacts = fit[:4]
@@ -101,9 +103,9 @@ def _with_processes(
     stds = {"noise": given.noise / farthest, "point_std": given.point_std / farthest}
     given = given._replace(contacts=contacts, **stds)
     residuals, posteriors = residuals / farthest[:, None] - offset[:, None], posteriors.scaled(1.0 / farthest)
-    turns, scales, processes = process_fit(given, weights, posteriors, residuals, start.ranks, -offset)
+    turns, scales, fitted = process_fit(given, weights, posteriors, residuals, start.ranks, -offset)
     contacts = contacts @ turns / scales[:, None, None]
-    return _Fit(points, axes @ turns, radii * farthest * scales, contacts, fit.degrees, processes)
+    return _Fit(points, axes @ turns, radii * farthest * scales, contacts, fit.degrees, fitted)
 
 
 def _observations(start: Start, axes: Array, radii: Array, contacts: Array) -> Observations:

@@ -268,9 +268,10 @@ def strokes_start(
 
 
 def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
-    """The domain through the ends of the curves on both sides of the point. Raises ValueError without one.
+    """The domain through the ends of the curves of a touch, which are in its frame and in unit radius.
 
-    If the surface ended before the first contact of a side, it ends at the point.
+    Where the surface ends at less than AT_POINT on a side, the domain ends at AT_POINT there. Raises
+    ValueError if the ends bound none.
     """
     last = np.maximum(curves.present.sum(axis=1) - 1, 0)
     rows, ahead = np.arange(len(last)), curves.tangents[:, :2]

@@ -130,21 +130,24 @@ def _is_inside_out(points: Array, sides: _Sides, hubs: Indices) -> bool:
         if volumes[number] >= 0.0:
             break
         own = np.flatnonzero(shell == number)
-        if _winding_before(at, fans, own[np.argmax(squares[own])]) < INSIDE_OUT:
+        if _winding_in_front(at, fans, own[np.argmax(squares[own])]) < INSIDE_OUT:
             return True
     return False
 
 
-def _winding_before(points: Array, triangles: Indices, number: int) -> float:
-    """The winding number of triangles (m, 3) of points just before the middle of one of them.
+def _winding_in_front(points: Array, triangles: Indices, number: int) -> float:
+    """The winding number of triangles (m, 3) of points just in front of the middle of one of them.
 
-    It is the sum of their solid angles (Van Oosterom & Strackee 1983), and that one's own is half of all.
+    It is the sum of their signed solid angles over 4 pi, of which arctangents are the halves (Van Oosterom &
+    Strackee 1983). That one's own is -2 pi.
+
+    number : of that triangle
     """
     middle, total = points[triangles[number]].mean(axis=0), 0.0
     others = np.delete(triangles, number, axis=0)
     for part in _parts(others):
         a, b, c = np.moveaxis(points[others[part]] - middle, 1, 0)
         u, v, w = (np.linalg.norm(corner, axis=1) for corner in (a, b, c))
-        below = u * v * w + row_dot(a, b) * w + row_dot(b, c) * u + row_dot(c, a) * v
-        total += float(np.arctan2(row_dot(a, np.cross(b, c)), below).sum())
+        denominator = u * v * w + row_dot(a, b) * w + row_dot(b, c) * u + row_dot(c, a) * v
+        total += float(np.arctan2(row_dot(a, np.cross(b, c)), denominator).sum())
     return total / (2.0 * np.pi) - 0.5

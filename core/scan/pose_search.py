@@ -80,14 +80,14 @@ def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: 
     distinct = _distinct(places, residuals)
     poses = []
     for i in distinct[:best]:
-        rotation, place = places[i, :, :3] @ r.frame.axes.T, center + r.radius * places[i, :, 3]
+        rotation, origin = places[i, :, :3] @ r.frame.axes.T, center + r.radius * places[i, :, 3]
         good = residuals[distinct] < AMBIGUOUS * max(residuals[i], LEAST_RESIDUAL)
         pose = Pose(
             rotation,
-            translation=place - rotation @ r.frame.origin,
+            translation=origin - rotation @ r.frame.origin,
             residual=float(r.radius * residuals[i]),
-            vertex=int(np.argmin(np.sum((co - place) ** 2, axis=1))),
-            is_ambiguous=bool(slides[i] or np.count_nonzero(good) > 1),  # It is good itself.
+            vertex=int(np.argmin(np.sum((co - origin) ** 2, axis=1))),
+            is_ambiguous=bool(slides[i] or np.count_nonzero(good) > 1),  # One of them is this pose.
         )
         poses.append(pose)
     return poses
@@ -102,9 +102,9 @@ def _initial_poses(oriented: Array, mesh: ScanMesh) -> Array:
     turns = Rotation.from_rotvec(
         2.0 * np.pi / TRIED_TURNS * np.arange(TRIED_TURNS)[:, None] * [0.0, 0.0, 1.0]
     ).as_matrix()
-    scores = np.column_stack([_scores(oriented @ turn.T, fields) for turn in turns])
-    least = (scores <= np.roll(scores, 1, axis=1)) & (scores <= np.roll(scores, -1, axis=1))
-    order = np.argsort(np.where(least, scores, np.inf), axis=None)[
+    costs = np.column_stack([_costs(oriented @ turn.T, fields) for turn in turns])
+    least = (costs <= np.roll(costs, 1, axis=1)) & (costs <= np.roll(costs, -1, axis=1))
+    order = np.argsort(np.where(least, costs, np.inf), axis=None)[
         : min(COARSE_PLACES, np.count_nonzero(least))
     ]
     places = places[order // TRIED_TURNS]
@@ -135,16 +135,16 @@ def _fields(mesh: ScanMesh, reach: float) -> tuple[Array, Array]:
     return places, np.concatenate(fields).T
 
 
-def _scores(oriented: Array, fields: Array) -> Array:
-    """The sums (m,) of squared normal residuals of the contacts to the polynomials (k, m) of m places.
+def _costs(oriented: Array, polynomials: Array) -> Array:
+    """The sums (m,) of squared normal residuals of the contacts to polynomials (k, m) of m places.
 
     Residuals are projected off the span of 1, x and y, so that a small tilt and a shift along the normal cost
-    nothing. On a quadric, neither does a small shift along the surface.
+    nothing. On a paraboloid, neither does a small shift along the surface.
     """
     contacts, weights = oriented[0], oriented[1, :, 2:]  # On a slope a height is more than the distance.
-    off = weights * (contacts[:, 2:] - monomials(contacts, QUARTIC) @ fields)
-    free = np.linalg.qr(weights * monomials(contacts, exponents(0, 1)))[0]
-    return np.sum(off**2, axis=0) - np.sum((free.T @ off) ** 2, axis=0)
+    off = weights * (contacts[:, 2:] - monomials(contacts, QUARTIC) @ polynomials)
+    tilts = np.linalg.qr(weights * monomials(contacts, exponents(0, 1)))[0]
+    return np.sum(off**2, axis=0) - np.sum((tilts.T @ off) ** 2, axis=0)
 
 
 def _axes(normals: Array) -> Array:

@@ -42,9 +42,9 @@ def spaced(points: Array, spacing: float, rng: np.random.Generator) -> Iterator[
 def spaced_count(area: float, spacing: float) -> int:
     """About how many points `spaced` takes of a surface of this area with points everywhere.
 
-    Disks of half the spacing that are put at random where there is room cover 0.547 of a plane in the end
-    (Feder 1980, Random sequential adsorption), which is 0.70 points in a square of the spacing. The grid
-    omits a sixth.
+    Disks with the spacing as diameter that are put at random until there is no room cover 0.547 of a plane
+    (Feder 1980, Random sequential adsorption), which is 0.70 points in a square of the spacing. Taking one
+    point of each cell, as `spaced` does, omits a sixth.
     """
     return max(1, round(JAMMED * area / spacing**2))
 

@@ -69,8 +69,8 @@ def verify(
     extra_contours, extra_points, extra_fit_error : the numbers of contours and their contacts, without noise,
         and (6) over these, if there are any
     total_absolute_curvature : (8)
-    overlap : the share of the patch's area with surface below it that a finger could reach, to about 0.01;
-        the paper has no number for it
+    overlap : the share of the patch's area over or under which there is surface that a finger could reach,
+        within a radius, to about 0.01; the paper has no number for it
 
     Raises ValueError for bad numbers.
     """
@@ -81,7 +81,7 @@ def verify(
 def verifying(
     r: Reconstruction, surface: Surface, vertices: ArrayLike, *, extra: int = EXTRA
 ) -> Iterator[dict[str, float]]:
-    """`verify` in short steps: each yields the measures so far, and the last one all."""
+    """`verify` in short steps: each yields the measures so far, the same dict each time."""
     local = r.frame.to_local(finite_array("vertices", vertices, (None, 3)))
     measures: dict[str, float] = {"contacts": len(r.contacts), "vertices": len(local)}
     measures |= _spread("contact", distances(r.geometry, r.contacts))

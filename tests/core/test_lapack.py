@@ -20,7 +20,7 @@ RIGHT = np.arange(12.0)
 def test_agrees_with_numpy():
     lower = np.linalg.cholesky(MATRIX)
     np.testing.assert_allclose(lapack.cholesky(MATRIX.copy()), lower, atol=1e-14)
-    np.testing.assert_allclose(lapack.cholesky_in_place(MATRIX.copy()), lower.diagonal(), atol=1e-14)
+    np.testing.assert_allclose(lapack.cholesky_diagonal(MATRIX.copy()), lower.diagonal(), atol=1e-14)
     np.testing.assert_allclose(lapack.solved(lower, RIGHT), np.linalg.solve(lower, RIGHT))
     np.testing.assert_allclose(lapack.solved(lower, RIGHT, transposed=True), np.linalg.solve(lower.T, RIGHT))
     np.testing.assert_allclose(lapack.solved_definite(MATRIX.copy(), RIGHT), np.linalg.solve(MATRIX, RIGHT))

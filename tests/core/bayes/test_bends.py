@@ -153,7 +153,7 @@ def bends(given, noise=0.0, k=0.0):
 def test_a_smooth_curve_bends_at_each_contact_however_these_are_spread(seed):
     steps = np.random.default_rng(seed).uniform(0.1, 3.0, 24)
     found = bends([contour(0.03 * np.concatenate([[0.0], np.cumsum(steps)]), steps)])
-    assert found.contacts == pytest.approx(1.0, abs=0.1)
+    assert found.contacts_per_bend == pytest.approx(1.0, abs=0.1)
     assert found.folded == 0.0
 
 
@@ -238,10 +238,10 @@ def test_noise_alone_bends_no_curve_and_a_fold_in_it_does():
 
 def test_rounding_is_no_bend_and_contacts_in_one_place_are_no_fold():
     level = contour(np.where(np.arange(25) < 12, 0.0, 1e-9), np.full(24, 0.1))
-    assert bends([level]).contacts == 1.0
+    assert bends([level]).contacts_per_bend == 1.0
     steps = np.full(24, 0.1)
     steps[5] = 1e-12
-    assert bends([contour(0.3 * np.linspace(-1.0, 1.0, 25), steps)]).contacts < 1.6
+    assert bends([contour(0.3 * np.linspace(-1.0, 1.0, 25), steps)]).contacts_per_bend < 1.6
 
 
 def test_outlying_contacts_without_normals_are_no_folds():
@@ -260,7 +260,7 @@ def test_one_normal_that_is_wrong_is_no_bend():
     wrong[7] += 0.5
     found = bends([contour(wrong, np.full(24, 0.1))])
     assert found.folded == pytest.approx(0.0, abs=1e-12)
-    assert found.contacts < 1.2
+    assert found.contacts_per_bend < 1.2
 
 
 @pytest.mark.parametrize("off", [0.014, 0.02, 0.04])
@@ -281,7 +281,7 @@ def test_turns_of_two_curves_are_no_outlier(first, second, turn):
         contour(angle * (np.arange(25) >= at), np.full(24, 0.1))
         for angle, at in ((turn, first), (-turn, second))
     )
-    assert bends([one, other]).contacts == pytest.approx(bends([one]).contacts)
+    assert bends([one, other]).contacts_per_bend == pytest.approx(bends([one]).contacts_per_bend)
 
 
 @pytest.mark.parametrize("sections", [24, 32, 64])

@@ -275,7 +275,7 @@ def test_the_coarse_search_forgives_a_tilt_and_a_shift_along_the_normal_and_noth
 
     def scores(z, weight=1.0):
         up = np.tile([0.0, 0.0, weight], (30, 1))
-        return pose_search._scores(np.array([np.column_stack([x, y, z]), up]), fields)
+        return pose_search._costs(np.array([np.column_stack([x, y, z]), up]), fields)
 
     z = 0.2 * x * y
     assert scores(z + 0.3 + 0.2 * x - 0.1 * y) == pytest.approx(scores(z), rel=1e-9)
@@ -332,9 +332,9 @@ def test_long_triangles_are_halved_until_a_patch_covers_many():
 
 
 def test_contours_are_tried_in_turns_of_ten_degrees(monkeypatch):
-    tried, scores = [], pose_search._scores
+    tried, costs = [], pose_search._costs
     monkeypatch.setattr(
-        pose_search, "_scores", lambda felt, fields: tried.append(felt[0, -1]) or scores(felt, fields)
+        pose_search, "_costs", lambda felt, fields: tried.append(felt[0, -1]) or costs(felt, fields)
     )
     register(touch(surfaces.plane()), 50.0 * SQUARE, [[0, 1, 2]])
     turns = np.sort(np.degrees(np.arctan2(*np.array(tried)[:, 1::-1].T)))
