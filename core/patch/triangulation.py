@@ -120,14 +120,14 @@ def _rim(domain: Domain, size: Size, off: float) -> tuple[Array, float]:
     return np.vstack([part for corner, at in pairs for part in (corner[None], around(at))]), finest
 
 
-def _steps_between(bends: Array, length: float, count: int) -> list[Array]:
+def _steps_between(corner_lengths: Array, length: float, count: int) -> list[Array]:
     """Lengths along the boundary at which the rim has points from each corner to the next, without both.
 
-    bends : (k,), the lengths at which corners are, ascending
+    corner_lengths : (k,), the lengths at which corners are, ascending
     length, count : of the whole boundary, and its number of edges if it had no corners
     """
     steps = []
-    for start, end in zip(bends, [*bends[1:], bends[0] + length], strict=True):
+    for start, end in zip(corner_lengths, [*corner_lengths[1:], corner_lengths[0] + length], strict=True):
         share = count * (end - start) / length
         edges = 2 * math.ceil(0.5 * share - 1e-6) if share > 1.0 else 1  # If even, none is across an axis.
         steps.append(start + (end - start) / edges * np.arange(1, edges))
