@@ -186,7 +186,7 @@ REASONS = {
     "holes": Reason("Triangles of this edge length leave holes", (SHORTER_EDGES,)),
     "open_edges": Reason(
         "The surface is up to {0} off the object beside an open edge of its mesh, as around a hole",
-        ("close it", FINER),
+        ("close the hole", FINER),
     ),
     "narrow": Reason(
         "The surface is up to {0} off the object where a wall or gap is {1} wide",
@@ -194,7 +194,7 @@ REASONS = {
     ),
     "hidden": Reason(
         "The surface is up to {0} off the object where its own parts nearly hide it",
-        ("delete what is inside", "touch it as an object of its own"),
+        ("delete what is inside", "touch that part as an object of its own"),
     ),
     "single_facets": Reason(
         "The surface is up to {0} off the object where touches follow single facets",

@@ -137,6 +137,8 @@ class Touch:
                 continue
             if _is_sure(explored.result, self.options) and _explains(explored, self.options):
                 explored = self._with_taps(explored)
+                if tried and explored.result.facet_width > explored.result.radius:
+                    break  # Within a facet that stands for a bend nothing shows the shape.
                 if _is_sure(explored.result, self.options):
                     return explored
             tried.append(explored)

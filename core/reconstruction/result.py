@@ -228,7 +228,7 @@ class Reconstruction(Judged):
     def curvature_covariance(self) -> Array:
         """The covariance of the coefficients of x^2, xy and y^2, (3, 3), in unit radius."""
         # One deviation in each direction: that of the coefficient of xy is larger by the square root of 2.
-        facets = (0.5 * self.radius * self._facet_std) ** 2 * np.diag([1.0, 2.0, 1.0])
+        facets = (0.5 * self.radius * self.facet_std) ** 2 * np.diag([1.0, 2.0, 1.0])
         beyond = self._bent_beyond
         return self.bends.with_few(self._fitted_covariance + np.outer(beyond, beyond)) + facets
 
@@ -285,8 +285,8 @@ class Reconstruction(Judged):
         return [max(abs(low - k1), abs(high - k2)) for k1, k2 in self.shape_curvatures.tolist()]
 
     @property
-    def _facet_std(self) -> float:
-        """How far they may be off: as far as the farthest estimate is, and as estimates are apart.
+    def facet_std(self) -> float:
+        """How far curvatures may be off by facets: as the farthest estimate is, and as estimates are apart.
 
         Facets of width w show how far the shape turns from one to the next, but not where within w. So what
         is open of the curvature, s, is a turn by s w. Half curves of length L < w may have all of it: the

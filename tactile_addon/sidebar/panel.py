@@ -38,12 +38,11 @@ from ..whole_object.object_report import (
     object_rows,
     object_verdict,
 )
-from .rows import dot, draw_rows, draw_sentence
+from .rows import dot, draw_rows, draw_sentence, is_wide
 
 TAB = "Tactile"
 HELP = "Click on a mesh: a probe feels its surface there and keeps a patch of it with its curvatures"
 OTHER_MODE = "Objects are touched in Object Mode, so the buttons are gray"
-NARROW = 200  # A sidebar of fewer pixels at scale 1 is narrow.
 ICONS = {"ok": "CHECKMARK"}
 
 
@@ -74,7 +73,7 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         row = layout.row(align=True)
         move = row.row(align=True)
         move.enabled = probe.lock_of(found) is None
-        move.operator("tactile.pick", text="Move" if _is_wide(context) else "", icon="EYEDROPPER")
+        move.operator("tactile.pick", text="Move" if is_wide(context) else "", icon="EYEDROPPER")
         row.operator("tactile.pick", text="New", icon="ADD").new = True
         row.operator("tactile.delete", text="", icon="TRASH")
         settings = found.tactile_probe
@@ -108,11 +107,11 @@ def _draw_pick(context: bpy.types.Context, layout: bpy.types.UILayout, obj: Obje
 
 def _draw_planes(context: bpy.types.Context, layout: bpy.types.UILayout, settings: Any) -> None:
     """Draws the angles of the planes; a narrow sidebar has room for one of the two."""
-    is_wide = _is_wide(context)
+    has_tilts = is_wide(context)
     column = layout.column(align=True)
     heading = column.row(align=True)
     heading.label(text="", icon="BLANK1")
-    for text in ("Azimuth", "Tilt") if is_wide else ("Azimuth",):
+    for text in ("Azimuth", "Tilt") if has_tilts else ("Azimuth",):
         heading.label(text=text)
     heading.operator("tactile.add_plane", text="", icon="ADD")
     for i in range(settings.plane_count):
@@ -120,13 +119,9 @@ def _draw_planes(context: bpy.types.Context, layout: bpy.types.UILayout, setting
         row.use_property_split = False
         row.label(text="", icon_value=dot(i))
         row.prop(settings, "azimuths", index=i, text="")
-        if is_wide:
+        if has_tilts:
             row.prop(settings, "tilts", index=i, text="")
         row.operator("tactile.remove_plane", text="", icon="REMOVE").plane = i
-
-
-def _is_wide(context: bpy.types.Context) -> bool:
-    return context.region.width > NARROW * context.preferences.system.ui_scale
 
 
 class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
@@ -154,11 +149,11 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         draw_rows(context, layout, main_rows(record), active=not is_outdated)
         _draw_colors(context, layout, patch, "tactile_colors")
         _draw_shown(context, layout, found, patch)
-        # This button comes and goes while a probe is dragged, so that what is above does not jump.
-        if found is not None and is_outdated:
-            layout.operator("tactile.update", icon="FILE_REFRESH")
-        elif found is not None and wants_facets_finer(record):
-            layout.operator("tactile.add_subdivision", icon="MOD_SUBSURF")
+        if found is not None:
+            row = layout.row()  # It is gray where it does not help, so that what is below does not jump.
+            row.enabled = is_outdated or wants_facets_finer(record)
+            helps: Any = ("update", "FILE_REFRESH") if is_outdated else ("add_subdivision", "MOD_SUBSURF")
+            row.operator(f"tactile.{helps[0]}", icon=helps[1])
         _draw_comparison(context, layout, record)
         if body := _folded(layout, "more", "More"):
             _draw_more(context, body, patch, record)
@@ -210,6 +205,7 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
         record = obj[patch_record.MAP_RECORD]
         if words := map_facets(record):
             draw_sentence(context, layout, words, "ERROR")
+            layout.operator("tactile.add_subdivision", icon="MOD_SUBSURF")
         draw_rows(context, layout, map_rows(record))
         _draw_colors(context, layout, obj, "tactile_map_colors")
         if record["patches"] and (body := _folded(layout, "map_more", "Medians of the Patches")):
@@ -278,7 +274,7 @@ def _draw_shown(
     context: bpy.types.Context, layout: bpy.types.UILayout, found: Object | None, patch: Object
 ) -> None:
     """Draws the switches of what is shown with a patch and may hide it; a narrow sidebar has their icons."""
-    words: dict[str, Any] = {} if _is_wide(context) else {"text": ""}
+    words: dict[str, Any] = {} if is_wide(context) else {"text": ""}
     row = layout.row(align=True)
     row.use_property_split = False
     row.prop(patch, "tactile_contours", icon="CURVE_DATA", toggle=1, **words)

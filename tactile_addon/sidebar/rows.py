@@ -18,6 +18,7 @@ from ..viewport.overlay import TEXT
 
 # About the width of a letter, and what is free around a text, in pixels at scale 1.
 LETTER, PADDING = 6.5, 12.0
+NARROW = 240  # A sidebar of fewer pixels at scale 1 has no room for two columns of numbers.
 SIDE, RADIUS = 32, 10.0  # of the icon and of its dot, in pixels
 
 TIPS = {
@@ -95,7 +96,7 @@ def draw_rows(
 ) -> None:
     """Draws labels and values side by side, gray if they are not active.
 
-    A value that has no room to the right of its label stands below it.
+    A value that has no room to the right of its label stands below it, and so do all in a narrow sidebar.
     """
     longest = max((len(label) for label, _ in rows), default=0)
     share = min(max((longest + 4) / _letters(context), 0.34), 0.66)
@@ -104,14 +105,14 @@ def draw_rows(
     column = layout.column(align=True)
     column.active = active
     for label, value in rows:
-        is_long = blf.dimensions(FONT, value)[0] > room
+        is_long = not is_wide(context) or blf.dimensions(FONT, value)[0] > room
         line = column if is_long else column.split(factor=share, align=True)
         left = line.row(align=True)
         left.alignment = "LEFT"
         copy = left.operator(TACTILE_OT_copy_value.bl_idname, text=label, emboss=False, translate=False)
         copy.label, copy.value = label, value
         if is_long:
-            line = column.split(factor=0.15, align=True)
+            line = column.split(factor=0.08, align=True)
             line.label(text="")
         line.label(text=value, translate=False)
 
@@ -132,6 +133,11 @@ def draw_sentence(
         found = [*sentence.partition(": ")[::2]]
     for i, line in enumerate(found):
         column.label(text=line, icon=icon if i == 0 else "BLANK1")
+
+
+def is_wide(context: bpy.types.Context) -> bool:
+    """Whether the sidebar has room for two columns of numbers."""
+    return context.region.width > NARROW * context.preferences.system.ui_scale
 
 
 def _letters(context: bpy.types.Context) -> float:

@@ -50,8 +50,10 @@ def expected_count(obj: Object, depsgraph: bpy.types.Depsgraph, extent: float, s
     """
     evaluated, linear, _ = evaluated_object(obj, depsgraph)
     spacing = spacing or SPACING_SHARE * (extent or EXTENT_SHARE * size_of(evaluated, linear))
-    area = float(read_array(evaluated.data.polygons, "area").sum())
-    return core.spaced_count(area * abs(np.linalg.det(linear)) ** (2.0 / 3.0), spacing)
+    faces = evaluated.data.polygons
+    scales = np.linalg.norm(read_array(faces, "normal", 3) @ np.linalg.inv(linear), axis=1)
+    area = abs(np.linalg.det(linear)) * float(read_array(faces, "area") @ scales)
+    return core.spaced_count(area, spacing)
 
 
 def seconds_each(obj: Object, depsgraph: bpy.types.Depsgraph, arguments: Mapping[str, Any]) -> float:

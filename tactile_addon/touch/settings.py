@@ -182,15 +182,17 @@ def touch_arguments(settings: Any) -> dict[str, Any]:
 
 
 def draw_chosen(layout: bpy.types.UILayout, settings: Any, name: str) -> None:
-    """Draws a setting; of a number that is left to the surface, the one in use.
+    """Draws a setting; of a number that may be left to the surface, the one in use.
 
-    In the override of a library's probe that is gray, so the setting has a row of its own, too.
+    So its row goes on being dragged once it is given. In the override of a library's probe that row is gray,
+    so the setting itself has one.
     """
-    is_auto = name in AUTO and not getattr(settings, name)
-    is_used = is_auto and hasattr(settings, f"used_{name}")
-    if is_auto:
-        layout.prop(settings, f"used_{name}" if is_used else name, text=AUTO[name])
-    if not is_auto or (is_used and settings.id_data.override_library is not None):
+    is_auto, is_used = name in AUTO and not getattr(settings, name), hasattr(settings, f"used_{name}")
+    is_gray = is_used and settings.id_data.override_library is not None
+    if is_auto or (is_used and not is_gray):
+        words: dict[str, Any] = {"text": AUTO[name]} if is_auto else {}
+        layout.prop(settings, f"used_{name}" if is_used else name, **words)
+    if is_gray or not (is_auto or is_used):
         layout.prop(settings, name)
 
 

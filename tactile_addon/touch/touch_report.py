@@ -13,7 +13,7 @@ is_verified : whether the report has the keys that take long
 frame : the Darboux frame in the world: origin, d1, d2 and normal, three numbers each
 k1, k2, gaussian_curvature, mean_curvature : at the point, each with its `_std`
 shape_index, curvedness : at the point
-facet_width : that of the facet at the point, if few facets make the curvatures uncertain; or 0
+facet_std : the part of the deviations of curvatures that few facets make
 residual : the amplitude of the process that is added to the polynomial
 coefficients, radius : those of equation (1)
 contacts, fit_error : their number, and equation (6)
@@ -143,7 +143,7 @@ def reconstruction_report(result: core.Reconstruction, ended: str = "") -> Touch
         "mean_curvature_std": result.mean_curvature_std,
         "shape_index": float(at_point.shape_index),
         "curvedness": float(at_point.curvedness),
-        "facet_width": result.facet_width,
+        "facet_std": result.facet_std,
         "residual": result.radius * result.posterior.amplitude,
         "coefficients": result.patch.coefficients.tolist(),
         "radius": result.radius,

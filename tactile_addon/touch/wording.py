@@ -70,8 +70,8 @@ def verdict(report: TouchReport) -> str:
         return f"Doubtful: {report['doubts'][0]['advice']}"
     height = say_of(report, report["height_std"])
     if wants_facets_finer(report):
-        return "Good on facets: add a Subdivision modifier to feel curvatures"
-    if _is_uncertain(report):
+        return "Good on facets: subdivide the mesh if the shape is smooth"
+    if _uncertain_stds(report):
         return f"Good heights, to ± {height}; curvatures are uncertain"
     return f"Good: heights to ± {height}"
 
@@ -79,14 +79,14 @@ def verdict(report: TouchReport) -> str:
 def wants_facets_finer(report: Mapping[str, Any]) -> bool:
     """Whether facets are too few for what the verdict is about, so that a Subdivision modifier may help."""
     is_advised = any(core.SUBDIVIDE in doubt["advice"] for doubt in report["doubts"])
-    return is_advised or (report.get("facet_width", 0.0) > 0.0 and _is_uncertain(report))
+    by_facets = (2.0 * report.get("facet_std", 0.0) ** 2 > std**2 for std in _uncertain_stds(report))
+    return is_advised or any(by_facets)
 
 
-def _is_uncertain(report: Mapping[str, Any]) -> bool:
-    """Whether the deviation of a principal curvature leaves nothing of it."""
-    return any(
-        report[f"{key}_std"] > max(abs(report[key]), UNCERTAIN / report["radius"]) for key in ("k1", "k2")
-    )
+def _uncertain_stds(report: Mapping[str, Any]) -> list[float]:
+    """The deviations of those principal curvatures that these leave nothing of."""
+    stds = ((abs(report[key]), report[f"{key}_std"]) for key in ("k1", "k2"))
+    return [std for curvature, std in stds if std > max(curvature, UNCERTAIN / report["radius"])]
 
 
 def reasons(report: Mapping[str, Any]) -> list[str]:
@@ -152,7 +152,7 @@ def sentence(error: Exception) -> str:
 def curvatures(report: Mapping[str, Any]) -> str:
     """Both principal curvatures, such as "-2 and 0.5 1/m", or that they are not certain."""
     first, second = (say_of(report, known(report[key], report[f"{key}_std"]), -1) for key in ("k1", "k2"))
-    return "not certain" if _is_uncertain(report) else f"{first.partition(' ')[0]} and {second}"
+    return "not certain" if _uncertain_stds(report) else f"{first.partition(' ')[0]} and {second}"
 
 
 def _verification(report: TouchReport) -> str:

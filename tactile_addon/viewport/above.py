@@ -51,7 +51,7 @@ def draw_above() -> None:
     gpu.state.depth_mask_set(True)
     for obj in in_mesh:
         _draw(obj, obj[ABOVE])
-    if len(in_front) > 1:
+    if in_front:
         view: Any = context.region_data.view_matrix
         in_front.sort(key=lambda obj: (RECORD in obj, (view @ obj.matrix_world.translation).z))
         for obj in in_front:

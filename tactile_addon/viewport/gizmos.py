@@ -24,7 +24,7 @@ from .mouse import line_of_sight
 # Handles that turn planes are on the ends of their curves, and those that tilt planes this many extents above
 # the point, or at the first place where the view is free: at the curve's other end, or nearer.
 UPRIGHT, UPRIGHT_PLACES = 0.75, 10
-OFF = 0.05  # The target hides what is behind it by more than this share of the extent.
+OFF = 0.05  # An object hides what is behind it by more than this share of the extent.
 MARGIN = 10.0  # The radius of a handle in pixels at scale 1; handles do not overlap.
 BALL, LEAST_BALL = 0.12, 0.05  # Sizes of balls, in units of Blender's gizmo size.
 SHARE = 0.125  # A ball is no larger than this share of the patch in the view.
@@ -33,7 +33,7 @@ NEAREST = 1e3  # What is closer to the eye than the point by less than this does
 
 
 class TACTILE_GT_rim(bpy.types.Gizmo):
-    """The rim of a patch: a circle would be in the air beside a saddle"""
+    """The rim of a patch, as a circle would be in the air beside a saddle; or the stem of a ring above it"""
 
     bl_idname = "TACTILE_GT_rim"
     rim: Sequence[float] = ()  # Three coordinates a point.
@@ -68,6 +68,8 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         self.point.select_bias = NEAREST
         self.turns = [self._ball(DRAG_TURN, i, color) for i, color in enumerate(PLANE_COLORS)]
         self.tilts = [self._ball(DRAG_TILT, i, color) for i, color in enumerate(PLANE_COLORS)]
+        self.stem = self._handle(TACTILE_GT_rim.bl_idname, DRAG_TILT, 0, (1.0, 1.0, 1.0))
+        self.stem.use_draw_scale, self.stem.hide_select = False, True
         self.ends = dict.fromkeys((*self.turns, *self.tilts), 0)
 
     def _ball(self, what: str, plane: int, color: Sequence[float]) -> Any:
@@ -96,7 +98,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         seen = self._shrink(context, center, reach)
         active = min(settings.active_plane, settings.plane_count - 1)
         self.point.matrix_basis = Matrix.Translation(center)
-        self._is_hidden = partial(_is_hidden, context, settings.target, OFF * reach)
+        self._is_hidden = partial(_is_hidden, context, OFF * reach)
         self.point.hide = settings.target is None
         patch = probe.patch_of(obj)
         paths = (_from_ends(patch.matrix_world, path) for path in patch[CURVES]["contours"])
@@ -110,9 +112,15 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         for each, places in handles:
             place = self._put(context, each, places, taken)
             each.hide = self._is_hidden(place) or _apart(context, center, place) < APART
+        self._draw_stem(center, self.tilts[active], PLANE_COLORS[active])
         self.extent.hide = self._is_hidden(center) or seen < APART
         self.extent.rim = list(patch[CURVES]["rim"][0])  # Another touch frees the patch's own.
         self.extent.matrix_basis = drawn_at(context.space_data, patch)
+
+    def _draw_stem(self, center: Vector, ring: Any, color: Sequence[float]) -> None:
+        """Has a line drawn from the point to a ring above it: what is behind the ring may be far away."""
+        self.stem.hide, self.stem.color = ring.hide, color
+        self.stem.rim = [*center.to_tuple(), *ring.matrix_basis.translation]
 
     def _put(self, context: bpy.types.Context, handle: Any, places: list[Any], taken: list[Any]) -> Any:
         """Puts a handle on the first of these places where the view is free, or else on the first one.
@@ -162,23 +170,16 @@ def _seen(context: bpy.types.Context, place: Vector) -> Any:
     return location_3d_to_region_2d(context.region, context.region_data, place)
 
 
-def _is_hidden(context: Any, target: Any, off: float, place: Vector) -> bool:
-    """Whether a place of the world is behind a mesh in the view, by more than this length."""
+def _is_hidden(context: Any, off: float, place: Vector) -> bool:
+    """Whether a place of the world is behind an object in the view, by more than this length."""
     space, view = context.space_data, context.region_data
-    is_clear = space.shading.type == "WIREFRAME" or space.shading.show_xray
-    if target is None or is_clear or not target.visible_in_viewport_get(space):
+    if space.shading.type == "WIREFRAME" or space.shading.show_xray:
         return False
-    shown, sight = target.evaluated_get(context.evaluated_depsgraph_get()), line_of_sight(view, place)
-    eye = (
-        view.view_matrix.inverted_safe().translation
-        if view.is_perspective
-        else place - space.clip_end * sight
-    )
-    start, end = (shown.matrix_world.inverted_safe() @ at for at in (place - off * sight, eye))
-    try:
-        return bool(shown.ray_cast(start, end - start, distance=(end - start).length)[0])
-    except RuntimeError:  # Blender has no mesh of it, as of an object whose collection is excluded.
-        return False
+    sight, eye = line_of_sight(view, place), view.view_matrix.inverted_safe().translation
+    far = (eye - place).length if view.is_perspective else space.clip_end
+    depsgraph, start = context.evaluated_depsgraph_get(), place - off * sight
+    hit, _, _, _, found, _ = context.scene.ray_cast(depsgraph, start, -sight, distance=max(far - off, 0.0))
+    return hit and not probe.is_result(found.original) and found.original.visible_in_viewport_get(space)
 
 
 def _apart(context: bpy.types.Context, place: Vector, other: Vector) -> float:

@@ -89,18 +89,24 @@ def test_a_good_verdict_says_where_curvatures_are_uncertain(wording, more, is_un
 
 
 def test_a_good_verdict_on_facets_says_what_shows_curvatures(wording):
-    assert "facets" not in wording.verdict(record(facet_width=0.1))
-    words = wording.verdict(record(facet_width=0.1, k2_std=0.2))
-    assert words == "Good on facets: add a Subdivision modifier to feel curvatures"
+    assert wording.verdict(record(facet_std=0.1)).startswith("Good: heights")
+    assert "facets" not in wording.verdict(record(facet_std=0.1, k2_std=0.2))  # Facets make a quarter of it.
+    words = wording.verdict(record(facet_std=0.15, k2_std=0.2))
+    assert words == "Good on facets: subdivide the mesh if the shape is smooth"
 
 
-def test_a_patch_on_a_facet_has_the_button_that_helps(extension, wording, empty):
+def test_a_patch_in_a_facet_of_a_coarse_mesh_is_not_shown_for_its_shape(extension, wording, empty):
     empty.ops.mesh.primitive_monkey_add()
-    empty.ops.tactile.pick(location=empty.context.object.data.polygons[300].center)
+    facet = empty.context.object.data.polygons[300]
+    place, width = facet.center.copy(), facet.area**0.5
+    empty.ops.tactile.pick(location=place)  # A patch of a hundredth of this facet is flat, and sure.
     obj = empty.context.object
     report = obj.children[0]["tactile"].to_dict()
+    assert report["extent"] > width and extension.core.SUBDIVIDE in wording.verdict(report)
+    assert dict(drawn_of(empty, extension, obj))["tactile.add_subdivision"]
+    obj.tactile_probe.extent = 0.01 * width
+    report = obj.children[0]["tactile"].to_dict()
     assert report["status"] == "ok" and wording.verdict(report).startswith("Good on facets")
-    assert "tactile.add_subdivision" in [text for text, _ in drawn_of(empty, extension, obj)]
 
 
 def test_a_flat_patch_has_no_shape_index(wording, empty):
@@ -216,11 +222,12 @@ class Layout:
     """Keeps what a panel draws in `drawn`, as (text, whether it is not gray); its parts share the list."""
 
     def __init__(self, whole=None):
-        self.drawn, self.whole, self.active = [] if whole is None else whole.drawn, whole, True
+        self.drawn, self.whole = [] if whole is None else whole.drawn, whole
+        self.active = self.enabled = True
 
     @property
     def is_gray(self):
-        return not self.active or (self.whole is not None and self.whole.is_gray)
+        return not (self.active and self.enabled) or (self.whole is not None and self.whole.is_gray)
 
     def part(self, *_, **__):
         return Layout(self)
@@ -285,8 +292,7 @@ def test_the_advice_alone_says_whether_the_button_helps(extension, empty, ball):
     obj, record = empty.context.object, empty.context.object.children[0]["tactile"]
     for advice, helps in (("use a shorter extent", False), (extension.core.SUBDIVIDE, True)):
         record["doubts"] = [{"code": "folds", "sentence": "The surface turns", "advice": advice}]
-        names = [text for text, _ in drawn_of(empty, extension, obj)]
-        assert ("tactile.add_subdivision" in names) is helps
+        assert dict(drawn_of(empty, extension, obj))["tactile.add_subdivision"] is helps
 
 
 def drawn_of(bpy, extension, obj):

@@ -34,7 +34,7 @@ def without(bpy, obj, where):
 
 def test_a_hole_is_named_only_beside_it(empty, ball, why):
     without(empty, ball, lambda center: center.z > 1.95)
-    beside = "beside an open edge of its mesh, as around a hole: close it or use a smaller tolerance."
+    beside = "beside an open edge of its mesh, as around a hole: close the hole or use a smaller tolerance."
     assert why((0.6, 0.0, 1.9), 0.3) == beside
     assert why((0.0, 0.0, -2.0), 0.3) is None
 
@@ -56,8 +56,8 @@ def test_a_pocket_is_named_where_few_directions_lead_outside(empty, ball, why):
     without(empty, ball, lambda center: center.z > 1.98)
     ball.modifiers.new("Solidify", "SOLIDIFY").thickness = 0.2
     empty.context.view_layer.update()
-    hidden = "where its own parts nearly hide it: delete what is inside or touch it as an object of its own."
-    assert why((0.0, 0.0, -1.8), 0.1) == hidden
+    hidden = "where its own parts nearly hide it: delete what is inside or touch that part as an object of "
+    assert why((0.0, 0.0, -1.8), 0.1) == f"{hidden}its own."
 
 
 def test_facets_are_named_where_touches_follow_them(empty, extension, why):
