@@ -41,8 +41,9 @@ def read(paths: Iterable[str | Path], unit: str, meters: float, whole: bool = Fa
         factor = core.UNIT_METERS[named] / meters if named else 1.0
         # Quotients such as 1 / 0.1 are not exact, but a file in the world's unit must stay as it is.
         factor = 1.0 if math.isclose(factor, 1.0, rel_tol=1e-6) else factor
-        contours += [_scaled(curve, factor) for curve in curves]
-        strokes += [_scaled(stroke, factor) for stroke in off_point]
+        still = np.eye(3), np.zeros(3), np.zeros(3)
+        contours += [curve.moved(factor, *still) for curve in curves]
+        strokes += [stroke.moved(factor, *still) for stroke in off_point]
         points += [] if point is None else [[factor * x for x in point]]
         directions += [] if outward is None else [outward]
         found = named or found
@@ -112,13 +113,6 @@ class MeasuredObject:
             "tolerance": self._tolerance,
             "noise": self._noise,
         }
-
-
-def _scaled(curve: core.Contour, factor: float) -> core.Contour:
-    lengths = {key: getattr(curve, key) for key in ("noise", "ball") if getattr(curve, key) is not None}
-    return replace(
-        curve, points=factor * curve.points, **{key: factor * length for key, length in lengths.items()}
-    )
 
 
 def fit(

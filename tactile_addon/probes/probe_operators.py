@@ -183,9 +183,8 @@ def _subdivide(target: Object) -> None:
     """Gives an object a Subdivision Surface modifier, or one more level of the one it has."""
     modifier: Any = next((m for m in reversed(target.modifiers) if m.type == "SUBSURF"), None)
     if modifier is None:
-        modifier, level = target.modifiers.new("Subdivision", "SUBSURF"), 1
-        while level < SUBDIVISIONS and 4 ** (level + 1) * len(target.data.polygons) <= MOST_FACES:
-            level += 1
+        modifier, faces = target.modifiers.new("Subdivision", "SUBSURF"), max(len(target.data.polygons), 1)
+        level = min(max(int(math.log(MOST_FACES / faces, 4.0)), 1), SUBDIVISIONS)
     else:
         level = modifier.levels + 1
     modifier.levels, modifier.render_levels = level, max(level, modifier.render_levels)

@@ -35,7 +35,7 @@ from ..touch.evaluated_mesh import read_array
 from ..touch.settings import MOST_PLANES, NAMES, TouchSettings, length_property, touch_arguments
 from ..touch.types import Array, Object, Outcome
 from ..touch.wording import fit
-from .stability import NOTHING, REASON_KEYS, REASONS, StabilityMap, expected_count, seconds_each
+from .stability import NOTHING, REASON_KEYS, REASONS, StabilityMap
 
 PLACES = "tactile_places"  # The points that were touched, in the axes of the map: three numbers each,
 VALUES = "tactile_values"  # and what was found there, by the names of the attributes, with
@@ -321,9 +321,11 @@ class TACTILE_OT_stability_map(AllOver, TouchSettings, bpy.types.Operator):
 
     def _estimate(self, context: bpy.types.Context, target: Object) -> str:
         """A sentence on what will be touched at how many points."""
-        depsgraph = context.evaluated_depsgraph_get()
-        count = expected_count(target, depsgraph, self.extent, self.spacing)
-        seconds = count * seconds_each(target, depsgraph, touch_arguments(self))
+        touches = StabilityMap(
+            target, context.evaluated_depsgraph_get(), spacing=self.spacing, **touch_arguments(self)
+        )
+        count = touches.expected_count()
+        seconds = count * touches.seconds_each()
         words = f"about {many(units.rough(count), 'touch', 'touches')}, {units.duration(seconds)}"
         return f"{target.name}: {words}"
 

@@ -4,6 +4,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from copy import copy
 from functools import partial
 from statistics import median
 from time import perf_counter
@@ -17,7 +18,7 @@ from ...core.steps import chunked
 from ...core.triangles import cut_to_edges, triangle_cross
 from ..scene.mesh_data import MEASURES
 from ..touch.detached_mesh import DetachedMesh
-from ..touch.evaluated_mesh import evaluated_object, read_array, size_of
+from ..touch.evaluated_mesh import evaluated_object, size_of
 from ..touch.touch_object import FARTHEST_SHARE, LEAST_STEPS, require_fine, require_lengths
 from ..touch.types import Array, Object, Point, Triple
 from ..touch.units import length
@@ -41,31 +42,6 @@ REASONS = [
 ]
 REASON_KEYS = [key for key, _, _ in REASONS]
 STOP_CODES = {stop: code for code, (_, _, stop) in enumerate(REASONS) if stop}
-
-
-def expected_count(obj: Object, depsgraph: bpy.types.Depsgraph, extent: float, spacing: float) -> int:
-    """About how many points of an object are touched; `extent` and `spacing` may be 0 as in StabilityMap.
-
-    Raises ValueError, with a sentence, for an object that cannot be touched.
-    """
-    evaluated, linear, _ = evaluated_object(obj, depsgraph)
-    spacing = spacing or SPACING_SHARE * (extent or EXTENT_SHARE * size_of(evaluated, linear))
-    faces = evaluated.data.polygons
-    scales = np.linalg.norm(read_array(faces, "normal", 3) @ np.linalg.inv(linear), axis=1)
-    area = abs(np.linalg.det(linear)) * float(read_array(faces, "area") @ scales)
-    return core.spaced_count(area, spacing)
-
-
-def seconds_each(obj: Object, depsgraph: bpy.types.Depsgraph, arguments: Mapping[str, Any]) -> float:
-    """About how many seconds a touch of an object takes, by one batch of touches far apart.
-
-    Raises ValueError, with a sentence, for an object that cannot be touched.
-    """
-    tried = StabilityMap(obj, depsgraph, spacing=TRIED_SPACING * max(obj.dimensions), **arguments)
-    for _ in tried.steps():
-        if tried.done:
-            return (perf_counter() - tried.began) / tried.done
-    return 0.0
 
 
 class StabilityMap:
@@ -118,13 +94,28 @@ class StabilityMap:
         self.planes, self.noise, self.seed, self.fit = planes, noise, seed, fit
         self._rng = np.random.default_rng(seed)
         _rehearse(planes, fit, **self._glance)
-        if expected_count(obj, depsgraph, extent, self.spacing) > MOST_TOUCHES:
+        if self.expected_count() > MOST_TOUCHES:
             raise ValueError(
                 f'The spacing {length(self.spacing)} takes over {MOST_TOUCHES:,} touches of "{obj.name}": '
                 "use a larger one"
             )
         self.places: list[Array] = []
         self.done = self.few_facets = 0
+
+    def expected_count(self) -> int:
+        """About how many points are touched."""
+        corners = self.surface.points[self.surface.triangles]
+        areas = 0.5 * np.linalg.norm(triangle_cross(corners), axis=1)
+        return core.spaced_count(float(areas.sum()), self.spacing)
+
+    def seconds_each(self) -> float:
+        """About how many seconds a touch takes, by one batch of touches far apart."""
+        tried = copy(self)
+        tried.spacing, tried.places = TRIED_SPACING * self.surface.size, []
+        for _ in tried.steps():
+            if tried.done:
+                return (perf_counter() - tried.began) / tried.done
+        return 0.0
 
     def steps(self) -> Iterator[None]:
         """Does everything, as a generator that yields every few hundredths of a second."""

@@ -427,12 +427,15 @@ def examine_map(painted):
     event("map, in doubt" if record["in_doubt"] else "map, patches" if record["patches"] else "map, none")
 
 
-def is_long(bpy, stability, target, arguments):
+def is_long(bpy, extension, target, arguments):
     """Whether a map takes thousands of touches, and not so many that it is refused."""
     obj, graph = bpy.data.objects.get(target), bpy.context.evaluated_depsgraph_get()
+    planes = [extension.core.SamplingPlane(azimuth) for azimuth in (0.0, 1.0, 2.0)]
+    fit = {"method": "bayes", "degree": "auto", "weight": None, "solver": "fast"}
+    lengths = {name: arguments[name] for name in ("spacing", "extent")} | {"step": 0.0, "noise": 0.0}
     try:
-        lengths = arguments["extent"], arguments["spacing"]
-        return 1000 < stability.expected_count(obj, graph, *lengths) <= stability.MOST_TOUCHES
+        stability = extension.tactile_addon.stability_map.stability
+        return stability.StabilityMap(obj, graph, planes, seed=0, **lengths, **fit).expected_count() > 1000
     except (ArithmeticError, AttributeError, TypeError, ValueError):  # It is refused, whatever it is.
         return False
 
@@ -446,7 +449,7 @@ def test_a_stability_map_in_any_scene(empty, extension, data):
     arguments = inputs(data.draw, MAP, MAP_INPUTS)
     if "step" in arguments:  # thousands of touches with thousands of contacts each take as long as a hang
         arguments |= MAP
-    if is_long(bpy, extension.tactile_addon.stability_map.stability, target, arguments):
+    if is_long(bpy, extension, target, arguments):
         arguments = {}
     before, chosen = digest(bpy), selection(bpy)
     try:

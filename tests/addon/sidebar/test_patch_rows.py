@@ -182,14 +182,22 @@ def test_every_row_says_what_it_is(wording, extension, ball):
 
 
 @pytest.mark.long
-def test_a_map_knows_about_how_many_points_it_will_touch(extension, empty):
+@pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (8.0, 1.0, 1.0)])
+def test_a_map_knows_about_how_many_points_it_will_touch(extension, empty, scale):
     empty.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64)
-    ball = empty.context.object
-    ball.scale = (2.0, 2.0, 2.0)
-    depsgraph = empty.context.evaluated_depsgraph_get()
-    expected = extension.tactile_addon.stability_map.stability.expected_count(ball, depsgraph, 0.0, 0.5)
+    empty.context.object.scale = scale
+    planes = [extension.core.SamplingPlane(azimuth) for azimuth in (0.0, 1.0, 2.0)]
+    touches = extension.tactile_addon.stability_map.stability.StabilityMap(
+        empty.context.object,
+        empty.context.evaluated_depsgraph_get(),
+        planes,
+        spacing=0.5,
+        **{"extent": 0.0, "step": 0.0, "noise": 0.0, "seed": 0},
+        **{"method": "bayes", "degree": "auto", "weight": None, "solver": "fast"},
+    )
     empty.ops.tactile.stability_map(spacing=0.5)
-    assert expected == pytest.approx(empty.context.object["tactile_map"]["points"], rel=0.1)
+    points = empty.context.object["tactile_map"]["points"]
+    assert touches.expected_count() == pytest.approx(points, rel=0.1)
 
 
 def test_lengths_in_messages_are_in_the_unit_of_the_scene(extension, empty):
