@@ -3,6 +3,7 @@
 """The words of `blender -c tactile reconstruct|fit|object|join|map|table FILE`."""
 
 import argparse
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,6 +13,7 @@ from .. import core
 from .command_run import Misuse, run, write
 from .touch.settings import METHODS, SOLVERS
 
+NEGATIVE = re.compile(r"-(\.?\d|inf|nan)")  # argparse takes -1e-3 for an option, unless a space precedes it.
 UNCERTAIN = 3  # The exit code of `join` for a surface that is not closed or in doubt.
 VECTOR: dict[str, Any] = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
 NUMBER: dict[str, Any] = {"type": float}
@@ -148,7 +150,7 @@ def main(args: Sequence[str]) -> int:
     stdout: Any = sys.stdout
     stdout.reconfigure(line_buffering=True)
     parser = _parser()
-    options = parser.parse_args([f" {a}" if _is_number(a) else a for a in args])
+    options = parser.parse_args([f" {a}" if NEGATIVE.match(a) else a for a in args])
     try:
         report = run(options)
         write(report, options)
@@ -176,15 +178,6 @@ def _parser() -> argparse.ArgumentParser:
             command.add_argument(option, **OPTIONS[option], help=help)
     parser.set_defaults(**dict.fromkeys(option.strip("-").replace("-", "_") for option in OPTIONS))
     return parser
-
-
-def _is_number(text: str) -> bool:
-    """Whether a word is a number: argparse would take -1e-3 for an option, unless a space precedes it."""
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _sentence(error: Exception) -> str:

@@ -47,33 +47,36 @@ class Command(NamedTuple):
     more: dict[str, Any]
 
 
-def _lines_of(rows: Callable[[Any], list[tuple[str, str]]]) -> Callable[[Any], str]:
-    """A function that puts the rows of a report into lines of label and value."""
-    return lambda report: table(rows(report))
-
-
 PATCH_FILES = (".blend", ".ply", ".json")
 MESH_FILES = (".blend", ".ply")
 COMMANDS = {
-    "reconstruct": Command("reconstruct", patch_record.RECORD, _lines_of(readable_rows), PATCH_FILES, {}),
-    "fit": Command("import_contacts", patch_record.RECORD, _lines_of(readable_rows), PATCH_FILES, {}),
+    "reconstruct": Command(
+        "reconstruct", patch_record.RECORD, lambda report: table(readable_rows(report)), PATCH_FILES, {}
+    ),
+    "fit": Command(
+        "import_contacts", patch_record.RECORD, lambda report: table(readable_rows(report)), PATCH_FILES, {}
+    ),
     "table": Command("", "", lambda report: f"{many(report['rows'], 'row', 'rows')} written", (".csv",), {}),
     "object": Command(
         "touch_all_over",
         patch_record.ATLAS_RECORD,
-        _lines_of(object_table_rows),
+        lambda report: table(object_table_rows(report)),
         MESH_FILES,
         {"progress": True},
     ),
     "join": Command(
         "import_contacts",
         patch_record.ATLAS_RECORD,
-        _lines_of(object_table_rows),
+        lambda report: table(object_table_rows(report)),
         MESH_FILES,
         {"whole": True, "progress": True},
     ),
     "map": Command(
-        "stability_map", patch_record.MAP_RECORD, _lines_of(map_table_rows), MESH_FILES, {"progress": True}
+        "stability_map",
+        patch_record.MAP_RECORD,
+        lambda report: table(map_table_rows(report)),
+        MESH_FILES,
+        {"progress": True},
     ),
 }
 # Operators would replace negative numbers by 0.

@@ -146,7 +146,13 @@ def fit(
     start = perf_counter()
     contours, unit, of_file, up, strokes = _chosen(contacts, normal_std, all_strokes)
     point, outward = of_file if point is None else point, up if outward is None else outward
-    point, distances = _reference_point(contours, strokes) if point is None else (point, None)
+    distances: Array | None = None  # By how much curves miss the point.
+    if point is None:
+        point, distances = (
+            core.common_point(contours)
+            if contours
+            else (np.vstack([stroke.points for stroke in strokes]).mean(axis=0), None)
+        )
     contours, felt = [core.in_running_order(c, point) for c in contours], [*contours, *strokes]
     reconstruct = partial(core.reconstruct, point, contours, strokes=strokes, **options)
     unknown = outward is None and not any(c.normals is not None for c in felt)
@@ -192,12 +198,3 @@ def _on_a_side(
     if flip is not (unknown and bulges > FLAT):
         result = reconstruct(outward=-result.frame.axes[:, 2])
     return result
-
-
-def _reference_point(
-    contours: Sequence[core.Contour], strokes: Sequence[core.Contour]
-) -> tuple[Any, Array | None]:
-    """Where curves meet, and by how much each misses it; without curves it is the mean of the strokes."""
-    if contours:
-        return core.common_point(contours)
-    return np.mean(np.vstack([stroke.points for stroke in strokes]), axis=0), None
