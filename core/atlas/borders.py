@@ -18,23 +18,22 @@ from ..arguments import Array
 from ..contours.contour import vector_of
 from ..contours.finger import Contact
 from ..triangles import LEAST_DIVISOR, SAME, normalized, row_dot, triangle_cross
+from .charts import PLACES_AT_ONCE
 from .connectivity import Indices, connected_pieces
+from .curvature import SHARP
 from .finger import Finger
 from .meshing import Mesh
 
 # python -m benchmarks.atlas judges these.
 REACH, STEP = 6.0, 0.5  # A border is looked for within this many edges of the mesh's, in such steps,
 HALVINGS = 8  # and then by this many halvings.
-TURNED = 0.87  # A border has a corner where the |cosine| between its directions on both sides is less,
-STRAIGHT = 0.1  # if it is straight on both sides to this share of an edge.
+STRAIGHT = 0.1  # A border has a SHARP corner if it is straight on both sides to this share of an edge.
 INWARD = 0.1  # Corners are felt this share of the way from there to the middle of the chord across them.
 SMOOTHINGS = 3  # This often directions of a border become the means of their neighbors'.
 UNFOLDINGS = 8  # Triangles that turn over are mended this often; nearly all are after one (test_borders).
 NEAREST = 12  # The nearest segment is one of this many whose middles are nearest.
 # Sides of the border below this share of an edge are one place. With 1e-6 the triangle of one turns over at a
 SHORT = 0.01  # notch of an open sheet, with the kernels that OpenBLAS has for SkylakeX (test_borders).
-
-PLACES_AT_ONCE = 1000  # A step feels this many places.
 
 # How far a surface is above points near some places, found in steps.
 Offsets = Callable[[Array, Indices], Generator[float, None, Array]]
@@ -169,7 +168,7 @@ def _corners(places: Array, before: Indices, after: Indices, edge: float) -> tup
     cosine, along_u, along_v = row_dot(u, v), row_dot(b - a, u), row_dot(b - a, v)
     squared_sine = np.maximum(1.0 - cosine**2, LEAST_DIVISOR)
     s, t = (along_u - cosine * along_v) / squared_sine, (cosine * along_u - along_v) / squared_sine
-    meet &= (np.abs(cosine) < TURNED) & u.any(axis=1) & v.any(axis=1)
+    meet &= (np.abs(cosine) < SHARP) & u.any(axis=1) & v.any(axis=1)
     meet &= (np.minimum(s, t) > -STRAIGHT * edge) & (np.maximum(s, t) < REACH * edge)
     corners = 0.5 * (a + s[:, None] * u + b + t[:, None] * v)
     return np.where(meet[:, None], corners, places[before]), meet

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import Array
+from ..arguments import SMALLEST, Array
 from ..triangles import normalized, row_dot
 from .cubic_spline import CUBIC, SIDE, bspline_weights, cubics
 
@@ -24,8 +24,6 @@ AZIMUTHS = 96  # The radius of a domain is stored in this many directions.
 REACH = 0.5  # A patch is evaluated at places up to this share of its radius above or below it.
 # Weights of four neighbors (Catmull and Rom 1974), by the share of the way between the middle two.
 CATMULL_ROM = np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]]) / 2.0
-ASIDE = 0.3  # What is farther than this share of the radius off the normal at its foot has no foot.
-FLAT = 0.15  # A patch is flat if it is nowhere steeper than this slope to its own plane.
 LEAST_COSINE = 0.4  # Where the normal has a lesser cosine to that at the point, heights run away: no feet.
 PLACES_AT_ONCE = 3000  # A step takes this many places.
 CHUNK = 24_000  # This many pairs of a place and a patch fit into the processor's cache at once.
@@ -59,7 +57,8 @@ class Charts:
 
     origins, axes, radii : (n, 3), (n, 3, 3) and (n,), of the patches, in the caller's unit
     halves : (n,), half the side of each table, in unit radius
-    heights, stds : (n, SIDE, SIDE), spline coefficients of the heights, and their deviations, in unit radius
+    heights : (n, SIDE, SIDE), spline coefficients of the heights, in unit radius
+    stds : (n, k, k), their deviations at every other knot, because these are smooth and take the longest
     rims : (n, AZIMUTHS), the radii of the domains, in unit radius
     """
 
@@ -153,11 +152,10 @@ class Charts:
         h, hx, hy = self._heights(foot_x, foot_y, patch)
         cosine, radius = 1.0 / np.sqrt(1.0 + hx**2 + hy**2), self.radii[patch]
         distance = (z - h - hx * (x - foot_x) - hy * (y - foot_y)) * cosine
-        aside = (x - foot_x) ** 2 + (y - foot_y) ** 2 + (z - h) ** 2 - distance**2
         std = self.stds_at(foot_x, foot_y, patch) * cosine
         normal = self._to_world_directions(patch, np.array([-hx * cosine, -hy * cosine, cosine]))
         pairs = Pairs(place, patch, rho, distance * radius, normal, std * radius)
-        return pairs.chosen((aside < ASIDE**2) & (np.abs(distance) < reach[patch]) & (cosine > LEAST_COSINE))
+        return pairs.chosen((np.abs(distance) < reach[patch]) & (cosine > LEAST_COSINE))
 
     def _to_world_directions(self, patch: NDArray[np.intp], local: Array) -> Array:
         """Directions (3, m) in the frames of patches, as the caller sees them, (m, 3)."""
@@ -183,31 +181,17 @@ class Charts:
         from scipy.ndimage import map_coordinates
 
         pitch = (2.0 * self.halves / (SIDE - 1))[patch]
-        at = np.array([patch, *(np.array([x, y]) / pitch + 0.5 * (SIDE - 1))])
+        at = np.array([patch, *(0.5 * np.array([x, y]) / pitch + 0.25 * (SIDE - 1))])
         return map_coordinates(self.stds, at, order=1, mode="nearest")
 
-    @cached_property
-    def inside(self) -> NDArray[np.bool_]:
-        """Which knots are in the domain, (n, SIDE, SIDE)."""
-        along = self.halves[:, None] * np.linspace(-1.0, 1.0, SIDE)
-        x, y = (axis.ravel() for axis in np.broadcast_arrays(along[:, :, None], along[:, None]))
-        patch = np.repeat(np.arange(len(self.radii)), SIDE**2)
-        return self.shares(x, y, patch).reshape(self.stds.shape) <= 1.0
-
-    @cached_property
+    @property
     def mean_stds(self) -> Array:
         """The mean deviation of the heights over each domain, (n,), a length."""
-        means: Array = (self.stds * self.inside).sum(axis=(1, 2))
-        means /= np.maximum(self.inside.sum(axis=(1, 2)), 1)
-        return self.radii * means
-
-    @cached_property
-    def is_flat(self) -> NDArray[np.bool_]:
-        """Which patches are flat, (n,), by the slopes between neighboring knots of their domains."""
-        pitch = (2.0 * self.halves / (SIDE - 1))[:, None, None]
-        steps = np.stack([self.heights[:, 1:, :-1], self.heights[:, :-1, 1:]]) - self.heights[:, :-1, :-1]
-        steep = (np.hypot(*steps) > FLAT * pitch) & self.inside[:, :-1, :-1]
-        return ~steep.any(axis=(1, 2))
+        along = self.halves[:, None] * np.linspace(-1.0, 1.0, SIDE)[::2]
+        x, y = (axis.ravel() for axis in np.broadcast_arrays(along[:, :, None], along[:, None]))
+        patch = np.repeat(np.arange(len(self.radii)), self.stds[0].size)
+        inside = self.shares(x, y, patch).reshape(self.stds.shape) <= 1.0
+        return self.radii * np.average(self.stds, axis=(1, 2), weights=np.maximum(inside, SMALLEST))
 
     def widened(self, factor: float) -> "Charts":
         """Tables of these patches whose deviations are larger by a factor."""
@@ -215,12 +199,9 @@ class Charts:
 
     def joined(self, others: "Charts") -> "Charts":
         """The tables of these patches, followed by others."""
-        both = Charts(
+        return Charts(
             *(np.concatenate([getattr(self, f.name), getattr(others, f.name)]) for f in fields(Charts))
         )
-        # Otherwise each touch would look at the knots of all patches before it again.
-        vars(both)["is_flat"] = np.append(self.is_flat, others.is_flat)
-        return both
 
     def rim_at(self, azimuths: NDArray[np.intp]) -> Array:
         """Local x and y (2, k) of the first patch's rim, at some of its AZIMUTHS."""

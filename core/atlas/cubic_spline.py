@@ -16,14 +16,6 @@ VALUES = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) 
 VALUES_AND_SLOPES = np.vstack([VALUES, np.pad(VALUES[:, 1:] * np.arange(1, 4), ((0, 0), (0, 1)))])
 
 
-def upsampled(some: Array) -> Array:
-    """Values (SIDE, SIDE) at all knots, interpolated linearly from those at every other knot."""
-    from scipy.ndimage import zoom
-
-    full: Array = zoom(some, SIDE / len(some), order=1)
-    return full
-
-
 def bases(x: Array, y: Array, half: float) -> tuple[Any, Array]:
     """The 16 knots (n, 16) around n places, and their shares (3, n, 16) in height and slopes there."""
     pitch = 2.0 * half / (SIDE - 1)

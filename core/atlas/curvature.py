@@ -22,7 +22,7 @@ SAGITTA = 80.0  # A quadric is so wide that its sagitta is this many deviations 
 LEAST = 2.0  # The least radius, in edges of the mesh; the sagitta follows from a quadric twice as wide.
 # It is fitted to every other vertex, in random order, to the nearest 128 at most and 6 at least.
 EVERY, PLACES, FEWEST = 2, 128, 6
-SHARP = 0.87  # Triangles on both sides of a crease are turned by 30 degrees,
+SHARP = 0.87  # Triangles on both sides of a crease are turned by 30 degrees, and a border at a corner.
 TURNED = 0.966  # Normals on both sides of a crease are turned by 15 degrees, half of what its triangles are.
 # Places are on one sheet if the cosine between their normals is more, and if the sum of both has at most the
 # share ACROSS of the way between them, which is 0 on a ball.

@@ -74,6 +74,8 @@ class Surface(NamedTuple):
 
 def dual_contour(charts: Charts, indicator: Indicator, pitch: float) -> Generator[float, None, Surface]:
     """The closed surface of patches, with edges about as long as the pitch; yields the share that is done."""
+    from scipy.sparse import csr_array
+
     lattice, edges, sides = yield from _turned_at_creases(charts, indicator, pitch)
     places, planes = _planes(lattice, sides, edges)
     yield 0.7
@@ -85,12 +87,12 @@ def dual_contour(charts: Charts, indicator: Indicator, pitch: float) -> Generato
     cells, index = np.unique(quads, return_inverse=True)
     quads = index.reshape(-1, 4)
     yield 0.7
-    around = np.arange(len(quads)).repeat(4), quads.ravel()
-    vertices, up = _vertices(*around, places, planes, lattice.places(cells) + 0.5 * pitch, pitch)
+    ends = np.arange(0, quads.size + 1, 4)
+    around = csr_array((np.ones(quads.size), quads.ravel(), ends), (len(quads), len(cells)))
+    vertices, up = _vertices(around.T, places, planes, lattice.places(cells) + 0.5 * pitch, pitch)
     quads, bent = _cut(vertices, quads, planes.normal, pitch)
-    middles = _vertices(
-        *_planes_around(quads, bent), places, planes, vertices[quads[bent]].mean(axis=1), pitch
-    )
+    centers = vertices[quads[bent]].mean(axis=1)
+    middles = _vertices(around[bent] @ around.T, places, planes, centers, pitch)
     vertices, up = (np.concatenate(both) for both in zip((vertices, up), middles, strict=True))
     yield 0.8
     own = planes.at(np.append(_least_uncertain(quads, planes, len(cells)), bent))
@@ -201,24 +203,21 @@ def _least_uncertain(quads: Indices, planes: Blend, count: int) -> Indices:
     return best
 
 
-def _vertices(
-    plane: Indices, cell: Indices, places: Array, planes: Blend, centers: Array, pitch: float
-) -> tuple[Array, Array]:
-    """The vertices (m, 3) of cells with centers (m, 3), and mean normals (m, 3) there.
+def _vertices(around: Any, places: Array, planes: Blend, centers: Array, pitch: float) -> tuple[Array, Array]:
+    """The vertices (m, 3) around centers (m, 3), and mean normals (m, 3) there.
 
     They minimize the squares of distances to planes, from between the mean of the places where these cross
     edges and the center.
 
-    plane, cell : (k,), which of the planes (n,) through places (n, 3) are around which cell
+    around : (m, n), sparse, the weights of planes (n,) through places (n, 3)
     """
-    count, normals = len(centers), planes.normal
-    weights = np.where(planes.patch < 0, LEVEL, 1.0)[plane]
-    total = np.bincount(cell, weights, count)
+    normals = planes.normal
+    weights = around.multiply(np.where(planes.patch < 0, LEVEL, 1.0)).tocsr()
+    total = weights.sum(axis=1)[:, None]
 
     def mean(values: Array) -> Array:
-        """Means (m, i) of values (n, i) over the planes around each cell."""
-        sums = [np.bincount(cell, weights * column[plane], count) for column in values.T]
-        return np.stack(sums, axis=1) / total[:, None]
+        """Means (m, i) of values (n, i) over the planes around each center."""
+        return (weights @ values) / total
 
     crossed, up = mean(places), mean(normals)
     start = crossed + CENTERED * (centers - crossed)
@@ -269,20 +268,6 @@ def _cut(vertices: Array, quads: Indices, normals: Array, pitch: float) -> tuple
     a, b, c, d = vertices[quads.T]
     apart = np.abs(row_dot(a + c - b - d, normalized(np.cross(c - a, d - b))))
     return quads, np.flatnonzero(apart > 2.0 * BENT * pitch)
-
-
-def _planes_around(quads: Indices, bent: Indices) -> tuple[Indices, Indices]:
-    """Pairs of a plane (k,) and the number (k,) in `bent` of a quadrilateral that shares a cell with it.
-
-    quads : (n, 4), the cells around each plane; the quadrilateral of a plane has its number
-    """
-    from scipy.sparse import csr_array
-
-    row_starts = np.arange(0, 4 * len(quads) + 1, 4)
-    shape = len(quads), int(quads.max(initial=0)) + 1
-    cells = csr_array((np.ones(4 * len(quads)), quads.ravel(), row_starts), shape)
-    shared = (cells[bent] @ cells.T).tocoo()
-    return shared.col, shared.row
 
 
 def _triangles(quads: Indices, bent: Indices, first: int) -> tuple[Indices, Indices]:

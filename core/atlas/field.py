@@ -14,14 +14,12 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from ..triangles import normalized, row_dot
 from .charts import MARGIN, Charts, Pairs
+from .join import LEAST_NOISE
 
 # python -m benchmarks.atlas judges these.
-OUTERMOST = 0.999  # Weights beyond this share of MARGIN are those there, so that none is 0.
-FLOOR = 1e-3  # No deviation below this share of the radius counts in a weight.
 # The cosines of 37 and of 53 degrees: patches that turn by less are one sheet, from there on they fade out of
 # it, and those that turn by more are another sheet.
 AGREE, APART = 0.8, 0.6
-FLAT_AGREE, FLAT_APART = 0.87, 0.75  # Those of flat patches, of 30 and 41 degrees: these end where sheets do.
 # Patches of one sheet differ in distance by at most this share of the radius, and this share of the distance
 # more, without which the default cone is off by 3.2 tolerances (benchmarks.add_menu).
 LAYER, SLANT = 0.15, 0.5
@@ -65,8 +63,8 @@ def patch_weights(charts: Charts, pairs: Pairs) -> Array:
 
 def weights_of(rho: Array, std: Array, radius: Array) -> Array:
     """w = (1 - u)^2 (1 + 2 u) / (std^2 + floor^2), (m,), where u is how far out a foot is, 1 at MARGIN."""
-    u = np.minimum(rho / MARGIN, OUTERMOST)
-    return (1.0 - u) ** 2 * (1.0 + 2.0 * u) / (std**2 + (FLOOR * radius) ** 2)
+    u = rho / MARGIN
+    return (1.0 - u) ** 2 * (1.0 + 2.0 * u) / (std**2 + (LEAST_NOISE * radius) ** 2)
 
 
 def facing_alike(charts: Charts, pairs: Pairs, up: Array, offset: Array, radius: Array) -> Array:
@@ -75,15 +73,12 @@ def facing_alike(charts: Charts, pairs: Pairs, up: Array, offset: Array, radius:
     radius : (m,), that of a patch of the sheet
     """
     band = LAYER * np.maximum(charts.radii[pairs.patch], radius) + SLANT * np.abs(offset)
-    return _facing(charts, pairs, up) * _within(pairs.distance - offset, band)
+    return _facing(pairs.normal, up) * _within(pairs.distance - offset, band)
 
 
-def _facing(charts: Charts, pairs: Pairs, up: Array) -> Array:
-    """From 1 to 0, (m,), how much patches face the way of normals (m, 3)."""
-    cosine: Array = row_dot(pairs.normal, up)
-    is_flat = charts.is_flat[pairs.patch]
-    apart, most = np.where(is_flat, FLAT_APART, APART), np.where(is_flat, FLAT_AGREE, AGREE)
-    agree: Array = np.clip((cosine - apart) / (most - apart), 0.0, 1.0)
+def _facing(normals: Array, up: Array) -> Array:
+    """From 1 to 0, (m,), how much normals (m, 3) face the way of others."""
+    agree: Array = np.clip((row_dot(normals, up) - APART) / (AGREE - APART), 0.0, 1.0)
     return agree * (agree * (3.0 - 2.0 * agree))
 
 
@@ -96,7 +91,7 @@ def _within(off: Array, band: Array) -> Array:
 def sheet_facing(charts: Charts, points: Array, up: Array, near: Array | float) -> Blend:
     """The sheet with normals `up` (k, 3) near places (k, 3), of patches within a length (k,)."""
     pairs, near = charts.pairs(points, float(np.max(near, initial=0.0))), np.broadcast_to(near, len(points))
-    alike = _facing(charts, pairs, up[pairs.point_index]) * _within(pairs.distance, near[pairs.point_index])
+    alike = _facing(pairs.normal, up[pairs.point_index]) * _within(pairs.distance, near[pairs.point_index])
     return _weighted_mean(pairs, patch_weights(charts, pairs) * alike, len(points))
 
 
@@ -125,7 +120,7 @@ def covered(
     """
     pairs = charts.pairs(points)
     near = np.abs(pairs.distance) < LAYER * charts.radii[pairs.patch]
-    on = (pairs.rho < share) & near & (_facing(charts, pairs, normals[pairs.point_index]) > 0.0)
+    on = (pairs.rho < share) & near & (_facing(pairs.normal, normals[pairs.point_index]) > 0.0)
     on &= pairs.patch >= first
     return np.bincount(pairs.point_index[on], minlength=len(points)) > 0
 
@@ -145,9 +140,7 @@ def argmin_per_point(place: NDArray[np.intp], key: NDArray[Any], count: int) -> 
 def _weighted_mean(pairs: Pairs, w: Array, count: int) -> Blend:
     """Weighted means at `count` places, with the deviation of the mean distance; the least rho.
 
-    Patches that share contacts err alike, so their deviations do not average out as independent ones do. But
-    the squared error of a mean is the mean squared error minus the mean square by which patches differ from
-    it (Krogh and Vedelsby 1995). It is at least the variance of the mean of patches that differ that much.
+    Patches that share contacts err alike, so their deviations do not average out as independent ones do.
     """
     place = pairs.point_index
 
@@ -160,16 +153,11 @@ def _weighted_mean(pairs: Pairs, w: Array, count: int) -> Blend:
     scale = 1.0 / np.where(is_met, weight, 1.0)
     rho = np.full(count, np.inf)
     np.minimum.at(rho, place[w > 0.0], pairs.rho[w > 0.0])
-    mean = scale * total(pairs.distance)
-    spread = scale * total(np.square(pairs.distance - mean[place]))
-    squares = scale * total(w * scale[place])  # Sums of squared shares: 1 over the effective number.
-    least = spread * squares / np.maximum(1.0 - squares, squares)  # A single patch has no spread.
-    variance = np.maximum(scale * total(np.square(pairs.std)) - spread, least)
     up = normalized(np.stack([total(pairs.normal[:, i]) for i in range(3)], axis=1))
     best = argmin_per_point(place, -w, count)
     return Blend(
-        mean,
-        np.where(is_met, np.sqrt(variance), np.inf),
+        scale * total(pairs.distance),
+        np.where(is_met, np.sqrt(scale * total(np.square(pairs.std))), np.inf),
         up,
         np.where(is_met, np.append(pairs.patch, -1)[best], -1),
         rho,

@@ -36,7 +36,7 @@ BETWEEN = ((0.97, 1), (0.6, 2))
 REACHES = (0.35, 0.12, 0.04)  # The finger goes on by these shares of the radius, until something is new.
 DISK_REACHES = 3.0  # What is new is measured on a disk of this many reaches, at most the patch's radius.
 BORDER_RADIUS = 5.0  # The radius of a place on the border of a mesh, in edges.
-BORDER_APART = 0.5  # The distance between such places, in their radii.
+AGAIN_APART = 0.5  # The distance between such places, and between touches there, in radii.
 SLIVER = 0.03  # The blend of patches bridges what is new if it is less than this share of the disk.
 IN_VAIN = 2.0  # What is within this many radii of the least patch of a touch in vain brings nothing, too.
 TRIES = 3  # Touches go on from a place at most this many times.
@@ -299,5 +299,5 @@ def border_places(mesh: Mesh) -> Iterator[RimPlace]:
     ways = normalized(np.cross(corners[:, 1] - corners[:, 0], ups))
     some = np.flatnonzero(ways.any(axis=1))  # Triangles without an area have no way beyond them.
     middles = corners.mean(axis=1)
-    for i in some[far_apart(middles[some], BORDER_APART * radius)]:
+    for i in some[far_apart(middles[some], AGAIN_APART * radius)]:
         yield RimPlace(vector_of(middles[i]), vector_of(ups[i]), vector_of(ways[i]), radius)

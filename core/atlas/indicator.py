@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..triangles import normalized
+from .charts import PLACES_AT_ONCE
 
 # python -m benchmarks.atlas judges these.
 LAYERS = 3.0  # This many cells across a wall resolve it.
 BORDER = 0.1  # The grid is wider than the samples by this share of the size, on each side.
 MOST_CELLS = 16_000_000  # More cells, of four bytes each, and a copy of them would take too much memory.
-SAMPLES_AT_ONCE = 3000  # A step takes this many samples,
-CELLS_AT_ONCE = 500_000  # or this many cells.
+CELLS_AT_ONCE = 500_000  # A step takes about this many cells.
 NEAR = np.array(list(np.ndindex(4, 4, 4)))  # The grid points that a cubic B-spline reaches.
 
 
@@ -82,8 +82,8 @@ def solve_poisson(
     shape = [next_fast_len(int(np.ceil((w + 2.0 * border) / cell)) + 1) - 1 for w in high - low]
     low = 0.5 * (low + high) - 0.5 * cell * (np.array(shape) - 1.0)
     values = np.zeros(shape, dtype=np.float32)
-    for start in range(0, len(points), SAMPLES_AT_ONCE):
-        some = slice(start, start + SAMPLES_AT_ONCE)
+    for start in range(0, len(points), PLACES_AT_ONCE):
+        some = slice(start, start + PLACES_AT_ONCE)
         _add_divergence(values, (points[some] - low) / cell, areas[some] / cell**2)
         yield 0.0
     waves = [(np.pi / (n + 1.0) * np.arange(1, n + 1)) ** 2 for n in shape]

@@ -16,13 +16,12 @@ from ..reconstruction.result import Reconstruction
 from ..steps import chunked
 from ..triangles import normalized, row_dot
 from .charts import AZIMUTHS, MARGIN, PLACES_AT_ONCE, Charts, Pairs
-from .cubic_spline import SIDE, upsampled
+from .cubic_spline import SIDE
 from .smoothing_spline import penalty, smoothing_spline
 
 # python -m benchmarks.atlas chose these.
 ALIGNED = 0.75  # A contact is on a patch if the cosine of the angle between their normals is at least this.
 UNDOUBTED = 2.0  # A contact that is off a patch by fewer of its deviations weighs 1.
-LOOSER = 5.0  # This many times larger they count a radius beyond the rim, where a patch is less certain.
 FARTHEST = 3.0  # A contact that is off by more times UNDOUBTED is on another sheet.
 LEAST_NOISE = 5e-4  # Contacts have at least this noise, as a share of the radius.
 PATCHES_AT_ONCE = 2  # A step takes this many patches.
@@ -84,7 +83,6 @@ def _joined_table(
     half = _half(rim)
     least = max(noise / r.radius, LEAST_NOISE)
     likely = np.hypot(least, UNDOUBTED * r.mean_height_std / r.radius)
-    likely = likely * (1.0 + LOOSER * np.maximum(some.rho - 1.0, 0.0))
     off = np.abs(some.distance) / (r.radius * likely)
     facing = row_dot(some.normal, normals[some.point_index]) > ALIGNED
     on = own[some.point_index] | ((off < FARTHEST) & facing)
@@ -137,16 +135,11 @@ def tabulate(r: Reconstruction, rim: Array, deviations: bool) -> Table:
     # Farther out a sextic runs away, and the spline would carry that inward.
     pull = r.radius * np.minimum(1.0, KNOTS_WITHIN / np.maximum(share, 1e-9))
     heights = r.height(pull * x, pull * y).reshape(SIDE, SIDE) / r.radius
-    stds = _stds(r, pull * x, pull * y) if deviations else np.zeros((SIDE, SIDE))
+    coarse = (pull * np.array([x, y])).reshape(2, SIDE, SIDE)[:, ::2, ::2]
+    stds = r.height_std(*coarse) / r.radius if deviations else np.zeros(coarse[0].shape)
     return rim, half, spline_filter(heights, order=3, mode="mirror"), stds
 
 
 def _half(rim: Array) -> float:
     """Half the side of the square of knots of a patch with this rim; the outermost are beyond it."""
     return float(MARGIN * rim.max()) * (SIDE - 1) / (SIDE - 3)
-
-
-def _stds(r: Reconstruction, x: Array, y: Array) -> Array:
-    """Deviations (SIDE, SIDE), computed at every other knot, because they are smooth and cost the most."""
-    x, y = (along.reshape(SIDE, SIDE)[::2, ::2] for along in (x, y))
-    return upsampled(r.height_std(x.ravel(), y.ravel()).reshape(x.shape) / r.radius)

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from .connectivity import Indices
-from .indicator import Indicator
+from .indicator import CELLS_AT_ONCE, Indicator
 
-POINTS_AT_ONCE = 500_000  # A step takes about this many points of the lattice.
 CORNERS: Indices = np.array(list(np.ndindex(2, 2, 2)))  # Those of a cell, from its lowest.
 AROUND: Indices = np.array(list(np.ndindex(3, 3, 3))) - 1  # A point and its neighbors.
 CENTER = 13  # The point among these,
@@ -95,7 +94,7 @@ def lattice_at_level(indicator: Indicator, pitch: float) -> Generator[float, Non
     length, ratio = len(indicator.values), indicator.cell / pitch
     shape = tuple(int(np.ceil((count - 1) * ratio)) + 4 for count in indicator.values.shape)
     lattice, near_level = Lattice(indicator, pitch, shape, np.zeros(0, dtype=np.intp)), []
-    rows = max(1, int(POINTS_AT_ONCE * length / (indicator.values.size * max(ratio, 1.0) ** 2)))
+    rows = max(1, int(CELLS_AT_ONCE * length / (indicator.values.size * max(ratio, 1.0) ** 2)))
     for start in range(0, length - 1, rows):
         cells = _cells(indicator.values[start : start + rows + 1] > 0.0) + np.array([start, 0, 0])
         near_level.append(_edges_near(lattice, cells * ratio, (cells + 1) * ratio))

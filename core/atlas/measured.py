@@ -21,13 +21,13 @@ from ..reconstruction.start import TOUCH_ROUNDING, too_coarse
 from ..steps import chunked, part_of, result_of
 from ..triangles import row_dot
 from ..verdict import Doubt, beyond
-from .charts import AZIMUTHS, Charts
+from .charts import AZIMUTHS, PLACES_AT_ONCE, Charts
 from .connectivity import Indices, graph_of, pieces_of
 from .field import AGREE, INSIDE, sheet_facing
 from .finger import FACING
 from .join import stacked, tabulate
 from .meshing import BETWEEN, MeasuredContacts
-from .object_atlas import AT_ONCE, Atlas, joined_surface
+from .object_atlas import Atlas, joined_surface
 from .orientation import THROUGH, doubts_of, oriented, place_text, planes_of, sharpened
 from .unfelt import place_at, uncovered_places
 
@@ -35,10 +35,9 @@ from .unfelt import place_at, uncovered_places
 FEWEST = 40  # The smallest patch has this many contacts.
 SOME_PLACES = 24  # The number of places at which patches show the noise.
 WIDENING, RADII = 1.4, 10  # Patches have one of this number of radii, each larger by the factor.
-# A patch is looked for at contacts that are farther than the first share of its radius from the middles of
-# others, or farther out on them than the second. Where there is none, none is looked for as near as that:
-# otherwise a patch bulges to a single contact that is off (test_measured).
-PATCHES_APART, COVERED = 0.6, 1.0
+# A patch is looked for at contacts that are farther than this share of its radius from the middles of others,
+# or not on these. Where there is none, none is looked for as near as that: otherwise a patch bulges to a
+PATCHES_APART = 0.6  # single contact that is off (test_measured).
 # A patch goes on to an edge where a contact is within this share of its neighbors' reach: with 0.3 an L whose
 # contacts end half a spacing before its edges is in doubt (test_measured), with 0.5 a pear of 400 even
 AT_EDGE = 0.45  # contacts has a spike of a twentieth of its size.
@@ -130,10 +129,10 @@ def _judged(
     """
     contacts, mesh, most = cloud.contacts, atlas.reference.mesh, atlas.tolerance or GROWN * radius
     off_surface = partial(_off_surface, atlas, cloud.noise, most)
-    distances, far, is_turned = yield from chunked(off_surface, AT_ONCE, 1.0, *contacts[:2])
+    distances, far, is_turned = yield from chunked(off_surface, PLACES_AT_ONCE, 1.0, *contacts[:2])
     limit = MOST_OFF * float(np.ptp(contacts.points, axis=0).max())
     off_enclosed = partial(_off_enclosed, atlas, cloud, limit)
-    between, spots, alike = yield from chunked(off_enclosed, AT_ONCE, 1.0, mesh.vertices, mesh.normals)
+    between, spots, alike = yield from chunked(off_enclosed, PLACES_AT_ONCE, 1.0, mesh.vertices, mesh.normals)
     worst, widest = _largest_cluster(far, distances, cloud.graph), np.argsort(-between, kind="stable")
     surface = list(beyond("noise", fit_noise, most))
     if not atlas.uncovered and atlas.reference.indicator.values[0, 0, 0] > 0.0:  # It is inside there.
@@ -483,7 +482,7 @@ def _patches(cloud: _Cloud, radius: float) -> Generator[float, None, tuple[list[
             tables.append(tabulate(r, cloud.rim(middle, r), deviations=True))
             chart, some = stacked([r], tables[-1:]), cloud.same_sheet(middle, PATCHES_APART * r.radius)
             x, y, _ = chart.local(points[some], np.arange(len(some)), np.zeros(len(some), dtype=np.intp))
-            left[some] &= chart.shares(x, y, np.zeros(len(some), dtype=np.intp)) > COVERED
+            left[some] &= chart.shares(x, y, np.zeros(len(some), dtype=np.intp)) > INSIDE
         yield 1.0 - float(left.mean())
     if not patches:
         raise ValueError(

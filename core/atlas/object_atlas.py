@@ -19,7 +19,7 @@ from ..triangles import LEAST_DIVISOR, far_apart, triangle_cross
 from ..verdict import FINER, TOUCHES, Doubt, Judged, beyond
 from .borders import Border, snapped_to_border
 from .boundaries import Edge, edges_of, gaussian_curvature_of, node_dict
-from .charts import Charts
+from .charts import PLACES_AT_ONCE, Charts
 from .curvature import NormalSamples, curvatures_of, sheets_of
 from .field import Blend, sheet_facing
 from .frontier import RimPlace
@@ -28,9 +28,7 @@ from .meshing import MOST_BYTES, WALL, Felt, MeasuredContacts, Mesh, memory_of, 
 from .reference_mesh import ReferenceMesh
 from .samples import indicated
 
-# Edges that are chosen by the curvature are between these shares of the size, those for thin walls above the
-# last one.
-FINE, SHARE, FINEST = 1.0 / 160.0, 1.0 / 60.0, 4e-3
+FINE, SHARE = 1.0 / 160.0, 1.0 / 60.0  # Edges that are chosen by the curvature are these shares of the size.
 LIMIT, ROUGH = 1.5, 0.01  # Deviations are above LIMIT tolerances on at most the share ROUGH of the surface.
 # What is off the surface by more tolerances is of something else: a patch ends there, and a contact
 # contradicts the surface if it is off by so many deviations, too.
@@ -38,9 +36,7 @@ NEAR, OFF_STDS = 3.0, 5.0
 THIN = 0.9  # Walls are resolved from this share of the thickness that cells are made for.
 BORDER = 2.0  # Beyond the border of the mesh it does from this many edges away.
 WITHIN_90 = 1.645  # This many deviations are a 90 % interval.
-WIDENINGS = 4  # Deviations grow this often until 90 % of the check's contacts are within.
-AT_ONCE = 3000  # Distances are found for this many places at once,
-CURVED_AT_ONCE = 1000  # and curvatures at this many.
+CURVED_AT_ONCE = 1000  # Curvatures are found at this many places at once.
 APART = 0.3  # The next touch is this many radii from those that failed.
 TURNS, STEPS = (0.0, 60.0, 120.0), 12  # The planes of the next touch, and the steps of a half curve.
 GRAPH_VERSION = 2  # The version of the graph as plain values.
@@ -90,7 +86,7 @@ def suggested_edge(patches: Sequence[Reconstruction], charts: Charts, indicator:
     stds, radii = charts.mean_stds, charts.radii
     chords = np.sqrt(4.0 * stds / np.maximum(bends, stds / radii**2))
     edge = float(np.clip(np.median(chords), FINE * indicator.size, SHARE * indicator.size))
-    return max(min(edge, WALL * indicator.resolved), FINEST * indicator.size)
+    return min(edge, WALL * indicator.resolved)
 
 
 def joined_surface(
@@ -242,28 +238,19 @@ class Atlas(Judged):
         # The mesh may end an edge or so before a border of the object.
         return np.abs(distance) > np.where(np.isinf(std), BORDER * self.reference.edge, length)
 
-    def widened(self) -> Generator[float, None, "Atlas"]:
+    def widened(self) -> "Atlas":
         """The atlas with deviations so large that 90 % of its check's contacts are in the 90 % interval.
 
-        Those that contradict the surface do not count: they are of something else. What patches differ by is
-        taken off the variance of their mean and does not grow, so they grow more than once. Yields 1 after
-        each.
+        Those that contradict the surface do not count: they are of something else.
         """
-        atlas, count = self, self.check.at_random
-        within = ~self.contradicting[:count]
-        for _ in range(WIDENINGS):
-            distance, std = (values[:count] for values in atlas._contacts)
-            felt = np.isfinite(std) & within
-            if not felt.any():
-                break
-            stds = np.abs(distance[felt]) / np.maximum(std[felt], LEAST_DIVISOR)
-            factor = float(np.quantile(stds, 0.9)) / WITHIN_90
-            if factor <= 1.0:
-                break
-            charts, reference = atlas.charts.widened(factor), atlas.reference.widened(factor)
-            atlas = replace(atlas, charts=charts, reference=reference)
-            yield 1.0
-        return atlas
+        distance, std = (values[: self.check.at_random] for values in self._contacts)
+        felt = np.isfinite(std) & ~self.contradicting[: self.check.at_random]
+        if not felt.any():
+            return self
+        stds = np.abs(distance[felt]) / np.maximum(std[felt], LEAST_DIVISOR)
+        factor = max(float(np.quantile(stds, 0.9)) / WITHIN_90, 1.0)
+        charts, reference = self.charts.widened(factor), self.reference.widened(factor)
+        return replace(self, charts=charts, reference=reference)
 
     def next_touch(self, failed: ArrayLike = ()) -> NextTouch | None:
         """Where the next touch would bring most, or None if all is covered to the tolerance and explained.
@@ -291,7 +278,7 @@ class Atlas(Judged):
         something unfelt might be nearer, and the deviation is inf.
         """
         p = finite_array("points", points, (None, 3), LARGEST)
-        return result_of(chunked(partial(self.reference.distances, self.charts), AT_ONCE, 1.0, p))
+        return result_of(chunked(partial(self.reference.distances, self.charts), PLACES_AT_ONCE, 1.0, p))
 
     def mesh(self, edge: float) -> Mesh:
         """The surface as triangles whose edges are about of this length.
@@ -336,7 +323,7 @@ class Atlas(Judged):
         mesh = self.reference.mesh
         normals = mesh.normals
         some = partial(sheet_facing, self.charts, near=self.reference.edge)
-        sheet = Blend._make(result_of(chunked(some, AT_ONCE, 1.0, mesh.vertices, normals)))
+        sheet = Blend._make(result_of(chunked(some, PLACES_AT_ONCE, 1.0, mesh.vertices, normals)))
         return sheets_of(mesh, np.where(sheet.patch[:, None] < 0, normals, sheet.normal))
 
     def meshing(self, edge: float) -> Generator[float, None, Mesh]:

@@ -17,6 +17,7 @@ from ..arguments import Array
 from ..triangles import normalized, row_dot
 from ..verdict import Doubt
 from .connectivity import Indices, connected_pieces
+from .field import AGREE
 
 # python -m benchmarks.measured --orientation judges these.
 FEWEST, MOST, MORE = 8, 600, 1.5  # The numbers of a plane's neighbors, and their growth until it is certain:
@@ -30,7 +31,6 @@ AT_ONCE = 20_000  # This many contacts are taken at once.
 BEND = 0.1  # Links along which the surface goes on come before those around edges and across gaps.
 SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
 DOUBTED = 0.02  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
-FACING = 0.8  # Contacts face one way, or opposite ways, if their normals do by this cosine.
 CLOSED = 0.15  # Contacts show their outer side if the mean of their winding numbers is more.
 DECISIVE = 0.3  # Against winding numbers a hint decides if its mean cosine to the normals is more.
 SMALL = 0.1  # Together at least this share of the contacts is turned,
@@ -238,8 +238,8 @@ def doubts_of(points: Array, normals: Array, links: Indices) -> Iterator[Doubt]:
     chords, others = points[links] - points[:, None], normals[links]
     facing = row_dot(normals[:, None], others)
     apart = np.abs(row_dot(chords, normals[:, None] + np.copysign(1.0, facing)[..., None] * others))
-    usual = np.median(np.append(apart[facing > FACING], 0.0))
-    wrong = (facing < -FACING) & (apart <= SAME_PLACE * usual)
+    usual = np.median(np.append(apart[facing > AGREE], 0.0))
+    wrong = (facing < -AGREE) & (apart <= SAME_PLACE * usual)
     if wrong.mean() > DOUBTED:
         yield Doubt("opposed", float(wrong.mean()), DOUBTED, (place_text(points[wrong.any(axis=1)]),))
 

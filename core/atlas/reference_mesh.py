@@ -15,7 +15,7 @@ from ..contours.contour import Vector
 from ..triangles import SAME, closest_point, normalized, row_dot, triangle_cross
 from .charts import Charts
 from .connectivity import Indices
-from .field import Blend, sheet_facing
+from .field import sheet_facing
 from .indicator import Indicator
 from .meshing import Mesh
 
@@ -26,10 +26,8 @@ SAGITTA = 0.5  # The surface is within this share of an edge of a place on the m
 PREPARED = ("tree", "fans", "edge", "normals", "is_open", "angles")  # Each is found once for a mesh.
 CLOSED = 0.25  # Where the indicator is farther from its level, felt area is around it: it knows the side.
 # python -m benchmarks.measured judges these: where the surface goes on unfelt,
-SHALLOW = 1.0  # the inside is known this many cells below the surface, and where the indicator is CLOSED;
 REACHES = 3.0  # the outside is known this many times farther than the foot is from the border,
-ABOVE = 0.12  # and up to this share of the size,
-BEYOND = 1.0  # and the surface is known this many edges beyond the border.
+ABOVE = 0.12  # and up to this share of the size.
 TURNED = 1.0  # Beyond the border it goes on turned by this angle, in radians, at two deviations.
 ON_SIDE = 1e-6  # A foot with a smaller weight of a vertex is on the side across from it.
 
@@ -133,9 +131,11 @@ class ReferenceMesh:
     def distances(self, charts: Charts, points: Array) -> tuple[Array, Array]:
         """Signed distances (n,) of places (n, 3), and deviations (n,), inf beyond where the mesh ends."""
         feet, triangle, std, ends = self.feet(points)
-        up, side = self.normals[triangle], row_dot(points - feet, self.normals[triangle])
-        surface, feet = self._project(charts, feet, up)
-        off = points - feet
+        up = self.normals[triangle]
+        side = row_dot(points - feet, up)
+        # What is farther from a place of the mesh is another part of the surface.
+        surface = sheet_facing(charts, feet, up, SAGITTA * self.edge)
+        off = points - feet + surface.distance[:, None] * surface.normal
         ahead, away = row_dot(off, surface.normal), np.linalg.norm(off, axis=1)
         smooth = np.abs(ahead) > AHEAD * away
         side = np.where(smooth & (surface.patch >= 0), ahead, side)
@@ -164,18 +164,17 @@ class ReferenceMesh:
         rim : (n,), distances from the border; behind : (n,), the indicator; ends : (n,), feet on the border
 
         What goes on beyond the border may come nearer than the foot, by as much as the place is farther away
-        than the foot is from the border. Behind the surface the inside is known where other parts close it,
-        and above it the outside where these do not contradict it.
+        than the foot is from the border. Behind the surface the inside is known within a cell and where other
+        parts close it, and above it the outside where these do not contradict it. The surface is known up to
+        an edge beyond the border.
         """
         to_border = np.sqrt(np.maximum(rim**2 - away**2, 0.0))
         across = np.sqrt(np.maximum(away**2 - ahead**2, 0.0))
-        shallow, above = (
-            SHALLOW * self.indicator.cell,
-            np.maximum(REACHES * to_border, ABOVE * self.indicator.size),
-        )
+        shallow = self.indicator.cell
+        above = np.maximum(REACHES * to_border, ABOVE * self.indicator.size)
         inside = (away < shallow) | ((behind > CLOSED) & ~ends)
         outside = (away < above) & ((behind < 0.0) | (away < shallow))
-        known = np.where(side < 0.0, inside, outside) & (~ends | (across < BEYOND * self.mesh.edge))
+        known = np.where(side < 0.0, inside, outside) & (~ends | (across < self.mesh.edge))
         nearer = 0.5 * (away * (1.0 - np.cos(TURNED)) - to_border * np.sin(TURNED))
         growth = np.where(ends, np.maximum(across, away - shallow), nearer)
         distance = np.where(ends, ahead, np.copysign(away, side))
@@ -187,9 +186,3 @@ class ReferenceMesh:
         from scipy.spatial import cKDTree
 
         return cKDTree(self.mesh.vertices[self.is_open])
-
-    def _project(self, charts: Charts, places: Array, up: Array) -> tuple[Blend, Array]:
-        """The surface near places (n, 3) that faces `up` (n, 3), and the places moved onto it."""
-        # What is farther from a place of the mesh is another part of the surface.
-        surface = sheet_facing(charts, places, up, SAGITTA * self.edge)
-        return surface, places - surface.distance[:, None] * surface.normal

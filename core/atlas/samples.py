@@ -18,12 +18,11 @@ from ..triangles import row_dot
 from .charts import LEAST_COSINE, PLACES_AT_ONCE, Charts
 from .field import facing_alike, patch_weights, weights_of
 from .indicator import LAYERS, Indicator, solve_poisson
+from .join import PATCHES_AT_ONCE
 
 # python -m benchmarks.atlas judges these.
 PITCH = 1.2  # Samples of a patch are this many cells apart.
-# The weights of other patches are computed once for up to PARTS^2 samples. The square around a patch has
-# ACROSS^2 or more.
-ACROSS, PARTS = 12, 8
+ACROSS = 12  # The square around a patch has at least this many along each axis.
 DENSER = 0.5  # If walls need cells finer than this share of those for samples, these are taken again.
 FINEST, COARSEST = 1.0 / 400.0, 1.0 / 80.0  # Cells are between these shares of the size.
 TOLERANCES = 5.0  # A cell is at most this many tolerances.
@@ -31,7 +30,6 @@ OPPOSITE = -0.9  # Two patches are the sides of a wall or gap if the cosine betw
 THIN_SHARE = 0.003  # Walls are at least that thick over all but this share of the area.
 BELOW = 1e-5  # Rays across walls begin this share of the size below the surface.
 CERTAIN = 5.0  # Two sides that are nearer than this many deviations are no wall or gap.
-PATCHES_AT_ONCE = 20  # A step takes this many patches.
 
 
 def indicated(charts: Charts, tolerance: float | None) -> Generator[float, None, Indicator]:
@@ -77,87 +75,57 @@ def samples_of(charts: Charts, pitch: float) -> Generator[float, None, Samples]:
     """Points of all patches, at most `pitch` apart along their tangent planes, and their parts of the area.
 
     Yields 0 between its steps.
-
-    The weights of other patches are smooth over a patch, so they are computed once for many samples.
     """
-    half = charts.widths
-    across = np.maximum(ACROSS, np.ceil(2.0 * half * charts.radii / pitch).astype(np.intp))
-    patch, x, y, middle, group = yield from _sample_grid(charts, half, across)
-    others, thickness = yield from chunked(
-        partial(_overlap_weight_and_thickness, charts),
-        PLACES_AT_ONCE,
-        0.0,
-        patch[middle],
-        x[middle],
-        y[middle],
-    )
-    cell_areas = ((2.0 * half * charts.radii / across) ** 2)[patch]
-    columns = patch, x, y, cell_areas, others[group], thickness[group]
-    return Samples._make((yield from chunked(partial(_samples, charts), PLACES_AT_ONCE, 0.0, *columns)))
+    across = np.maximum(ACROSS, np.ceil(2.0 * charts.widths * charts.radii / pitch).astype(np.intp))
+    patch, x, y = yield from _sample_grid(charts, across)
+    cell_areas = ((2.0 * charts.widths * charts.radii / across) ** 2)[patch]
+    steps = chunked(partial(_samples, charts), PLACES_AT_ONCE, 0.0, patch, x, y, cell_areas)
+    return Samples._make((yield from steps))
 
 
 def _sample_grid(
-    charts: Charts, half: Array, across: NDArray[np.intp]
-) -> Generator[float, None, tuple[NDArray[np.intp], Array, Array, NDArray[np.intp], NDArray[np.intp]]]:
+    charts: Charts, across: NDArray[np.intp]
+) -> Generator[float, None, tuple[NDArray[np.intp], Array, Array]]:
     """The patches and local x and y of evenly spread samples, (n,) each; yields 0.
 
-    half, across : half the width of a square around each patch, and the number of samples along it
-
-    Also the sample in the middle of each group of neighbors, (g,), and the group of each sample, (n,).
+    across : the number of samples along a square around each patch
     """
-    sides = np.maximum(1, np.minimum(across // ACROSS, PARTS))  # Samples of a group, along each axis.
-    places, groups = [], 0
-    for i, (count, few) in enumerate(zip(across.tolist(), sides.tolist(), strict=True)):
-        line = half[i] * ((2.0 * np.arange(count) + 1.0) / count - 1.0)
+    places = []
+    for i, count in enumerate(across.tolist()):
+        line = charts.widths[i] * ((2.0 * np.arange(count) + 1.0) / count - 1.0)
         x, y = (axis.ravel() for axis in np.meshgrid(line, line, indexing="ij"))
-        row, column = np.divmod(np.arange(count**2), count)
-        inside = charts.shares(x, y, np.full(len(x), i)) < 1.0
-        group = (row // few * (count // few + 1) + column // few)[inside]
-        aside = np.maximum(np.abs(row % few - few // 2), np.abs(column % few - few // 2))[inside]
-        places.append((np.full(len(group), i), x[inside], y[inside], groups + group, aside))
-        groups += (count // few + 1) ** 2
+        patch = np.full(len(x), i)
+        inside = charts.shares(x, y, patch) < 1.0
+        places.append((patch[inside], x[inside], y[inside]))
         if i % PATCHES_AT_ONCE == 0:
             yield 0.0
-    patch, x, y, group, aside = (np.concatenate(values) for values in zip(*places, strict=True))
-    _, group = np.unique(group, return_inverse=True)
-    yield 0.0
-    # The sample in the middle of a group is first.
-    order = np.lexsort((aside, group))
-    return patch, x, y, order[np.flatnonzero(np.diff(group[order], prepend=-1))], group
+    patch, x, y = (np.concatenate(values) for values in zip(*places, strict=True))
+    return patch, x, y
 
 
 def _overlap_weight_and_thickness(
-    charts: Charts, patch: NDArray[np.intp], x: Array, y: Array
+    charts: Charts, patch: NDArray[np.intp], points: Array, normals: Array
 ) -> tuple[Array, Array]:
-    """Sums (n,) of the weights of other patches on the same sheet, at local (x, y) (n,) of patches.
+    """Sums (n,) of the weights of other patches on the same sheet, at points of patches with normals (n, 3).
 
     Also the thickness of the wall or gap between the sheet and what faces the other way, (n,).
     """
-    points, normals = charts.world(patch, x, y)
     pairs, count = charts.pairs(points), len(points)
-    up, radius = normals[pairs.point_index], charts.radii[patch[pairs.point_index]]
-    alike = facing_alike(charts, pairs, up, offset=np.zeros(len(up)), radius=radius) * (
-        pairs.patch != patch[pairs.point_index]
-    )
-    weights = np.bincount(pairs.point_index, patch_weights(charts, pairs) * alike, count)
+    own, up = patch[pairs.point_index], normals[pairs.point_index]
+    alike = facing_alike(charts, pairs, up, offset=np.zeros(len(up)), radius=charts.radii[own])
+    weights = np.where(pairs.patch == own, 0.0, patch_weights(charts, pairs) * alike)
     opposite = (row_dot(pairs.normal, up) < OPPOSITE) & (pairs.rho < 1.0)
     opposite &= np.abs(pairs.distance) > CERTAIN * pairs.std
     thickness = np.full(count, np.inf)
     np.minimum.at(thickness, pairs.point_index[opposite], np.abs(pairs.distance[opposite]))
-    return weights.astype(np.float64), thickness  # Without pairs bincount returns integers.
+    # Without pairs bincount returns integers.
+    return np.bincount(pairs.point_index, weights, count).astype(np.float64), thickness
 
 
-def _samples(
-    charts: Charts,
-    patch: NDArray[np.intp],
-    x: Array,
-    y: Array,
-    cell_areas: Array,
-    others: Array,
-    thickness: Array,
-) -> Samples:
+def _samples(charts: Charts, patch: NDArray[np.intp], x: Array, y: Array, cell_areas: Array) -> Samples:
     """Samples of patches at local (x, y); `cell_areas` are in the tangent planes."""
     points, normals = charts.world(patch, x, y)
+    others, thickness = _overlap_weight_and_thickness(charts, patch, points, normals)
     share, cosine = charts.shares(x, y, patch), row_dot(normals, charts.axes[patch, :, 2])
     inside = cosine > LEAST_COSINE
     own = weights_of(share, charts.radii[patch] * charts.stds_at(x, y, patch) * cosine, charts.radii[patch])

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..arguments import Array
 from ..lapack import on_one_thread
-from .cubic_spline import CUBIC, SIDE, bases, upsampled
+from .cubic_spline import CUBIC, SIDE, bases
 
 # python -m benchmarks.atlas chose these.
 ORDER = 3  # The order of the random derivatives. With 2 as a choice, patches are 4 % farther off.
@@ -36,7 +36,7 @@ SPLINE_ROUNDING = 1e-9  # This share of its largest element keeps the matrix inv
 
 
 class Spline(NamedTuple):
-    """The coefficients (SIDE, SIDE) of heights, and the standard deviations (SIDE, SIDE) at the knots."""
+    """The coefficients (SIDE, SIDE) of heights, and their standard deviations (k, k) at every other knot."""
 
     coefficients: Array
     stds: Array
@@ -187,9 +187,9 @@ def _student(residuals: Array, std: float) -> Array:
 
 
 def _stds(factor: Array) -> Array:
-    """Deviations (SIDE, SIDE), computed at every other knot, because they are smooth and take the longest."""
-    some = np.sqrt((_triangular(factor, _heights_at_coarse_knots(), "N") ** 2).sum(axis=0))
-    return upsampled(some.reshape((SIDE + 1) // 2, -1))
+    """Deviations (k, k) at every other knot."""
+    stds: Array = np.linalg.norm(_triangular(factor, _heights_at_coarse_knots(), "N"), axis=0)
+    return stds.reshape((SIDE + 1) // 2, -1)
 
 
 @cache

@@ -24,7 +24,7 @@ from .borders import felt_border, snapped_to_border
 from .charts import Charts
 from .field import covered
 from .finger import FACING, Finger, finger_at
-from .frontier import Frontier
+from .frontier import AGAIN_APART, Frontier
 from .join import Table, refit
 from .meshing import Mesh
 from .object_atlas import LIMIT, NEAR, Atlas, Check, joined_surface
@@ -39,12 +39,12 @@ SMALL = 5.0  # Touches do not go on from a patch whose radius is below this many
 SIDE_BY_SIDE = 8  # This many touches at once are faster, and still done in a tenth of a second.
 AGAIN = 5  # Where something is missing or less certain, touches go on at most this often.
 CHECKS = 512  # This many rays from outside check the surface.
-SHARPEST, SPIKES = 64, 16  # This many go to its sharpest vertices, and to the triangles around the sharpest.
+# This many go to its sharpest vertices, and to the triangles around the sharpest. Without, one of 24 cones is
+SHARPEST, SPIKES = 64, 16  # "ok" and off by 5 tolerances; with 128 each, obtuse creases take more touches.
 # This many go to its least certain vertices. Without them, and with three rounds AGAIN, 3 of 39 runs on cones
 UNSURE = 128  # and chamfered boxes are "ok" and off by up to 4 tolerances.
 STRAIGHT = 0.5  # A ray must meet what it is aimed at if the cosine between it and the normal is more.
 BORDERS = 2  # This often a mesh is moved to the borders that are felt.
-AGAIN_APART = 0.5  # Touches that improve the joined surface are this many radii apart.
 LARGER = 2.0  # A touch reaches at most this many radii of the patch from which it goes on.
 
 PointNormal = tuple[ArrayLike, ArrayLike]  # A point and its normal, (3,) each.
@@ -282,7 +282,8 @@ class _Run:
         )
         improvable = atlas.improvable
         yield 1.0
-        atlas = yield from atlas.widened()
+        atlas = atlas.widened()
+        yield 1.0
         contacts: list[PointNormal] = [contact for _, contact in uncovered]
         contacts += zip(check.points[improvable], check.normals[improvable], strict=True)
         return atlas, contacts + (self.uncertain_contacts(atlas.reference.mesh) if atlas.is_rough else [])

@@ -9,7 +9,6 @@ import pytest
 
 import core
 from core.atlas.charts import AZIMUTHS, MARGIN, Charts
-from core.atlas.cubic_spline import SIDE
 from core.atlas.join import charts_of, tabulate
 from tests import solids
 
@@ -89,9 +88,9 @@ def test_deviations_are_linear_between_knots(charts):
     from scipy.interpolate import RegularGridInterpolator
 
     rng, halves = np.random.default_rng(4), charts.halves[3]
-    stds = rng.uniform(0.1, 1.0, (12, SIDE, SIDE))
+    stds = rng.uniform(0.1, 1.0, charts.stds.shape)
     x, y = rng.uniform(-halves, halves, (2, 50))
     found = replace(charts, stds=stds).stds_at(x, y, np.full(50, 3))
-    line = np.linspace(-halves, halves, SIDE)
+    line = np.linspace(-halves, halves, len(stds[3]))
     expected = RegularGridInterpolator((line, line), stds[3])(np.stack([x, y], axis=1))
     assert found == pytest.approx(expected)

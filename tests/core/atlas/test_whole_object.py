@@ -15,7 +15,6 @@ from core.atlas.finger import Finger
 from core.atlas.object_atlas import Check
 from core.atlas.touching import SIDE_BY_SIDE, _Run
 from core.exploration.options import ExplorationOptions
-from core.steps import result_of
 from tests import solids
 
 RING = solids.ring(small=0.5)
@@ -283,20 +282,17 @@ def test_contacts_off_the_surface_put_it_in_doubt(ball):
     shifted = ways * np.where(np.arange(50) < 20, 1.004, 1.0)[:, None]
     loose = replace(ball, check=Check(shifted, ways, np.zeros((0, 3)), len(shifted)))
     assert not loose.contradicting.any()
-    wide = result_of(loose.widened())
+    wide = loose.widened()
     distance, std = wide.distance(shifted)
     assert np.mean(np.abs(distance) <= 1.645 * std * 1.001) >= 0.9
-    # What patches differ by is taken off the variance of their mean, and does not grow with their variances.
     factor, grown = wide.charts.stds / loose.charts.stds, std / loose.distance(shifted)[1]
     assert factor == pytest.approx(factor.mean(), rel=1e-9)
     # Where no patch is, only the deviation of the closed surface grows.
     low, high = np.quantile(grown, [0.04, 0.96])
     assert 0.95 * factor.mean() < low <= high < 1.5 * factor.mean()
     assert np.median(grown) == pytest.approx(factor.mean(), rel=0.02)
-    assert result_of(right.widened()).distance(ways)[1] == pytest.approx(right.distance(ways)[1], rel=0.5)
-    assert result_of(wrong.widened()).distance(ways)[1] == pytest.approx(
-        result_of(right.widened()).distance(ways)[1], rel=0.1
-    )
+    assert right.widened().distance(ways)[1] == pytest.approx(right.distance(ways)[1], rel=0.5)
+    assert wrong.widened().distance(ways)[1] == pytest.approx(right.widened().distance(ways)[1], rel=0.1)
 
 
 def test_walls_that_the_cells_do_not_resolve_put_it_in_doubt(ball):
