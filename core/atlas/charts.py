@@ -24,6 +24,7 @@ AZIMUTHS = 96  # The radius of a domain is stored in this many directions.
 REACH = 0.5  # A patch is evaluated at places up to this share of its radius above or below it.
 # Weights of four neighbors (Catmull and Rom 1974), by the share of the way between the middle two.
 CATMULL_ROM = np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]]) / 2.0
+FLAT = 0.15  # A patch is flat if its slope to its own plane is less.
 LEAST_COSINE = 0.4  # Where the normal has a lesser cosine to that at the point, heights run away: no feet.
 PLACES_AT_ONCE = 3000  # A step takes this many places.
 CHUNK = 24_000  # This many pairs of a place and a patch fit into the processor's cache at once.
@@ -183,6 +184,13 @@ class Charts:
         pitch = (2.0 * self.halves / (SIDE - 1))[patch]
         at = np.array([patch, *(0.5 * np.array([x, y]) / pitch + 0.25 * (SIDE - 1))])
         return map_coordinates(self.stds, at, order=1, mode="nearest")
+
+    @property
+    def is_flat(self) -> NDArray[np.bool_]:
+        """Which patches are flat, (n,), by their heights: those of a paraboloid of this slope at its rim."""
+        across, along = self._extents
+        flat: NDArray[np.bool_] = along < 0.5 * FLAT * across
+        return flat
 
     @property
     def mean_stds(self) -> Array:

@@ -20,6 +20,8 @@ from .join import LEAST_NOISE
 # The cosines of 37 and of 53 degrees: patches that turn by less are one sheet, from there on they fade out of
 # it, and those that turn by more are another sheet.
 AGREE, APART = 0.8, 0.6
+# Those of flat patches, of 30 and 41 degrees: these end where sheets do. Without, a chamfered box takes an
+FLAT_AGREE, FLAT_APART = 0.87, 0.75  # eighth more touches (test_sharp_objects).
 # Patches of one sheet differ in distance by at most this share of the radius, and this share of the distance
 # more, without which the default cone is off by 3.2 tolerances (benchmarks.add_menu).
 LAYER, SLANT = 0.15, 0.5
@@ -73,12 +75,14 @@ def facing_alike(charts: Charts, pairs: Pairs, up: Array, offset: Array, radius:
     radius : (m,), that of a patch of the sheet
     """
     band = LAYER * np.maximum(charts.radii[pairs.patch], radius) + SLANT * np.abs(offset)
-    return _facing(pairs.normal, up) * _within(pairs.distance - offset, band)
+    return _facing(charts, pairs, up) * _within(pairs.distance - offset, band)
 
 
-def _facing(normals: Array, up: Array) -> Array:
-    """From 1 to 0, (m,), how much normals (m, 3) face the way of others."""
-    agree: Array = np.clip((row_dot(normals, up) - APART) / (AGREE - APART), 0.0, 1.0)
+def _facing(charts: Charts, pairs: Pairs, up: Array) -> Array:
+    """From 1 to 0, (m,), how much patches face the way of normals (m, 3)."""
+    is_flat = charts.is_flat[pairs.patch]
+    apart, most = np.where(is_flat, FLAT_APART, APART), np.where(is_flat, FLAT_AGREE, AGREE)
+    agree: Array = np.clip((row_dot(pairs.normal, up) - apart) / (most - apart), 0.0, 1.0)
     return agree * (agree * (3.0 - 2.0 * agree))
 
 
@@ -91,7 +95,7 @@ def _within(off: Array, band: Array) -> Array:
 def sheet_facing(charts: Charts, points: Array, up: Array, near: Array | float) -> Blend:
     """The sheet with normals `up` (k, 3) near places (k, 3), of patches within a length (k,)."""
     pairs, near = charts.pairs(points, float(np.max(near, initial=0.0))), np.broadcast_to(near, len(points))
-    alike = _facing(pairs.normal, up[pairs.point_index]) * _within(pairs.distance, near[pairs.point_index])
+    alike = _facing(charts, pairs, up[pairs.point_index]) * _within(pairs.distance, near[pairs.point_index])
     return _weighted_mean(pairs, patch_weights(charts, pairs) * alike, len(points))
 
 
@@ -120,7 +124,7 @@ def covered(
     """
     pairs = charts.pairs(points)
     near = np.abs(pairs.distance) < LAYER * charts.radii[pairs.patch]
-    on = (pairs.rho < share) & near & (_facing(pairs.normal, normals[pairs.point_index]) > 0.0)
+    on = (pairs.rho < share) & near & (_facing(charts, pairs, normals[pairs.point_index]) > 0.0)
     on &= pairs.patch >= first
     return np.bincount(pairs.point_index[on], minlength=len(points)) > 0
 

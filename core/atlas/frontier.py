@@ -168,26 +168,19 @@ class Frontier:
             heapq.heappush(self.queue, entry)
         return chosen
 
-    def uncovered(
-        self, reference: ReferenceMesh, tolerance: float
-    ) -> Generator[float, None, list[tuple[RimPlace, Contact]]]:
+    def uncovered(self, reference: ReferenceMesh) -> Generator[float, None, list[tuple[RimPlace, Contact]]]:
         """Places on the border of a mesh beyond which the object goes on, each with a contact there.
-
-        tolerance : contacts that the mesh is nearer to do not count
 
         Yields 1 after each.
         """
         uncovered = []
         for place in border_places(reference.mesh):
             yield 1.0
-            contacts = [
-                self.finger.ahead(place.point, place.normal, place.ahead, place.radius, share * place.radius)
-                for share in REACHES
-            ]
+            contacts = np.concatenate([self._ahead(place, share) for share in REACHES])
             # Across a notch the finger meets the mesh again.
-            off = [c for c in contacts if c is not None and reference.away(c[0]) > tolerance]
-            if off:
-                uncovered.append((place, off[-1]))
+            off = contacts[reference.ended(contacts[:, 0])]
+            if len(off):
+                uncovered.append((place, (vector_of(off[-1, 0]), vector_of(off[-1, 1]))))
         return uncovered
 
     def unfelt(self, mesh: Mesh) -> Generator[float, None, list[tuple[RimPlace, Contact]]]:

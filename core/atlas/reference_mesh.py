@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..contours.contour import Vector
 from ..triangles import SAME, closest_point, normalized, row_dot, triangle_cross
 from .charts import Charts
 from .connectivity import Indices
@@ -123,10 +122,6 @@ class ReferenceMesh:
             return np.zeros(len(points), dtype=bool)
         feet, _, _, ends = self.feet(points)
         return ends | (np.linalg.norm(points - feet, axis=1) > self.edge)
-
-    def away(self, point: Vector) -> float:
-        """The distance of a point from the triangles."""
-        return float(np.linalg.norm(self.feet(np.array([point]))[0] - point))
 
     def distances(self, charts: Charts, points: Array) -> tuple[Array, Array]:
         """Signed distances (n,) of places (n, 3), and deviations (n,), inf beyond where the mesh ends."""

@@ -239,17 +239,17 @@ class _Run:
 
     def check(self, reference: ReferenceMesh) -> Generator[float, None, Check]:
         """Contacts of a finger that comes from outside all round, and places of the mesh that it misses."""
-        starts, aims, facing, length = rays_at(reference, self.void)
+        starts, aims, ups, length = rays_at(reference, self.void)
         yield 1.0
         finger, ways = self.frontier.finger, normalized(aims - starts)
         met = [finger.met(vector_of(p), vector_of(way), length) for p, way in zip(starts, ways, strict=True)]
         contacts = np.array([contact for contact in met if contact is not None]).reshape(-1, 2, 3)
         has_met = np.array([contact is not None for contact in met])
         missed = []
-        for i in np.flatnonzero(~has_met[: len(facing)] & facing):
-            aim, back = vector_of(aims[i]), vector_of(-ways[i])
-            # Near a rim, or where a ray slips between two faces of a mesh, something is near.
-            if len(finger.disk(aim, back, tangent_of(back, None), self.frontier.near)) == 1:
+        for i in np.flatnonzero(~has_met[: len(ups)] & ups.any(axis=1)):
+            aim, up = vector_of(aims[i]), vector_of(ups[i])
+            # Near a rim or a crease, or where a ray slips between two faces of a mesh, something is near.
+            if len(finger.disk(aim, up, tangent_of(up, None), self.frontier.near)) == 1:
                 missed.append(i)
         return Check(contacts[:, 0], contacts[:, 1], aims[missed], int(has_met[:CHECKS].sum()))
 
@@ -275,7 +275,7 @@ class _Run:
         yield from reference.prepared()
         check = yield from self.check(reference)
         yield 1.0
-        uncovered = unfelt + (yield from self.frontier.uncovered(reference, self.tolerance))
+        uncovered = unfelt + (yield from self.frontier.uncovered(reference))
         places, taps = tuple(place for place, _ in uncovered), tuple(self.frontier.taps)
         atlas = Atlas(
             patches, charts, reference, self.tolerance, places, check, taps, border, self.done >= self.most
@@ -314,17 +314,15 @@ class _Run:
         return self.frontier.felt_near(mesh.vertices[places], normals[places])
 
 
-def rays_at(
-    reference: ReferenceMesh, void: Sequence[Contact] = ()
-) -> tuple[Array, Array, NDArray[np.bool_], float]:
+def rays_at(reference: ReferenceMesh, void: Sequence[Contact] = ()) -> tuple[Array, Array, Array, float]:
     """Rays that check a mesh from outside all round: their starts, and places that they go to, (k, 3).
 
-    Also whether each of the first CHECKS / 2 must meet something there, (CHECKS / 2,), see STRAIGHT, and the
-    length of all, which ends beyond the mesh. The first CHECKS are random: one half goes to middles of
-    triangles, the other to any place near the mesh. Others come straight down, as at a slant they would end
-    at the wall of a slot near its rim: to the SHARPEST vertices, whose triangles have the least sum of angles
-    there, to the UNSURE ones of the largest deviation, to triangles around SPIKES of the sharpest, and to as
-    many of the places `void`, where a finger met nothing near: there a slot may be bridged.
+    Also the normals (CHECKS / 2, 3) at those of the first that must meet something there, see STRAIGHT, and 0
+    at others; and the length of all, which ends beyond the mesh. The first CHECKS are random: half go to the
+    middles of triangles, the others to any place near the mesh. More come straight down, as at a slant they
+    would end at the wall of a slot near its rim: to the SHARPEST vertices, whose triangles have the least sum
+    of angles there, to the UNSURE ones of the largest deviation, to triangles around SPIKES of the sharpest,
+    and to as many of the places `void`, where a finger met nothing near: there a slot may be bridged.
     """
     rng, mesh = np.random.default_rng(0), reference.mesh
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
@@ -339,6 +337,7 @@ def rays_at(
     # The triangle's own normal counts: that of a vertex on a crease is between those of its sheets.
     ahead = row_dot(reference.normals[aimed], ways)
     facing = ahead < -STRAIGHT * np.linalg.norm(ways, axis=1)
+    ups = np.where(facing[:, None], reference.normals[aimed], 0.0)
     sharpest = np.argsort(np.where(reference.is_open, np.inf, reference.angles), kind="stable")[:SHARPEST]
     unsure = np.argsort(np.where(reference.is_open, 0.0, -mesh.std), kind="stable")[:UNSURE]
     some = np.append(sharpest, unsure)
@@ -347,7 +346,7 @@ def rays_at(
     bridged = np.array(void).reshape(-1, 2, 3)[rng.permutation(len(void))[:UNSURE]]
     straight = np.vstack([mesh.vertices[some], centers[around], bridged[:, 0]])
     up = far * np.vstack([mesh.normals[some], reference.normals[around], bridged[:, 1]])
-    return np.vstack([middle + away, straight + up]), np.vstack([aims, straight]), facing, 3.0 * far
+    return np.vstack([middle + away, straight + up]), np.vstack([aims, straight]), ups, 3.0 * far
 
 
 def _joined_and_refined(run: _Run) -> Steps:

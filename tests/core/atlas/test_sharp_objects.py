@@ -270,6 +270,17 @@ def test_a_start_on_an_edge_or_in_a_corner_finds_a_good_place_beside_it(point):
     assert solids.topology(atlas.reference.mesh.triangles) == solids.Topology(0, 0, 2, 1)
 
 
+def test_the_thin_rim_of_a_lens_is_closed_though_all_of_it_is_within_the_tolerance():
+    def distance(x, y, z):
+        size = math.hypot(x, y / 0.7, z / 0.08)
+        return size * (size - 1.0) / max(math.hypot(x, y / 0.49, z / 0.0064), 1e-12)
+
+    lens = solids.Solid(distance, (0.05, 0.03, 0.0798), (0.0, 0.0, 1.0))
+    atlas = core.explore_object(lens, lens.start, lens.outward, tolerance=0.02, rng=0)
+    assert atlas.status == "ok"
+    assert solids.topology(atlas.reference.mesh.triangles) == solids.Topology(0, 0, 2, 1)
+
+
 @pytest.mark.long
 def test_two_balls_with_a_gap_are_two_pieces_though_no_finger_slides_from_one_to_the_other():
     def distance(x, y, z):
