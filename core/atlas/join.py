@@ -22,8 +22,8 @@ from .smoothing_spline import penalty, smoothing_spline
 # python -m benchmarks.atlas chose these.
 ALIGNED = 0.75  # A contact is on a patch if the cosine of the angle between their normals is at least this.
 UNDOUBTED = 2.0  # A contact that is off a patch by fewer of its deviations weighs 1.
-# This many times larger they count a radius beyond the rim. Without, models (rocker-arm, spot) are off by just
-LOOSER = 5.0  # over three tolerances.
+# This many times larger they count a radius beyond the rim. Without, the models rocker-arm and spot are off
+LOOSER = 5.0  # by just over three tolerances.
 FARTHEST = 3.0  # A contact that is off by more times UNDOUBTED is on another sheet.
 LEAST_NOISE = 5e-4  # Contacts have at least this noise, as a share of the radius.
 PATCHES_AT_ONCE = 2  # A step takes this many patches.
