@@ -28,14 +28,14 @@ SUPERSCRIPTS = {1: "", 2: "²"}
 def unit_of(scene: bpy.types.Scene, size: float) -> Unit:
     """(name, length in units of the world) of the unit for a thing of this size; the name may be "".
 
-    It is the scene's own unit, which Blender's number fields have, unless numbers would become very long.
+    It is the scene's own unit, unless numbers would become very long.
     """
     settings = scene.unit_settings
     if settings.system == "NONE":
         return "", 1.0
     name: str = settings.length_unit
     meters = size * settings.scale_length * (1.0 + 1e-6)
-    if name == "ADAPTIVE" or not 1e-2 <= meters / METERS[name][1] <= 1e4:
+    if name == "ADAPTIVE" or not 1e-1 <= meters / METERS[name][1] <= 1e4:
         names = ADAPTIVE[settings.system]
         name = next((n for n in names if LEAST.get(n, 1.0) * METERS[n][1] <= meters), names[-1])
     symbol, meters = METERS[name]

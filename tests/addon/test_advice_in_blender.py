@@ -102,7 +102,7 @@ def test_a_shorter_edge_length_helps(empty, code, edge):
     record = empty.context.object["tactile_object"]
     assert [doubt["code"] for doubt in record["doubts"]] == [code]
     assert "use a shorter edge length" in record["message"]
-    assert empty.ops.tactile.mesh_again(edge=0.1) == {"FINISHED"}
+    assert empty.ops.tactile.mesh_again(edge=0.05) == {"FINISHED"}
     assert empty.context.object["tactile_object"]["status"] == "ok"
 
 
@@ -110,7 +110,7 @@ def test_a_shorter_edge_length_helps(empty, code, edge):
 def test_a_shorter_edge_length_helps_against_holes(empty):
     empty.ops.mesh.primitive_grid_add(x_subdivisions=100, y_subdivisions=100)
     for vertex in empty.context.object.data.vertices:
-        vertex.co.z = 0.35 * math.sin(4.0 * vertex.co.x)
+        vertex.co.z = 0.35 * math.sin(6.0 * vertex.co.x)
     empty.ops.tactile.touch_all_over(tolerance=0.04)
     for edge in np.arange(0.5, 0.8, 0.025):  # Which of them leave holes depends on the lattice.
         empty.ops.tactile.mesh_again(edge=edge)
@@ -119,7 +119,7 @@ def test_a_shorter_edge_length_helps_against_holes(empty):
             break
     else:
         pytest.fail("no edge leaves holes")
-    assert empty.ops.tactile.mesh_again(edge=0.3) == {"FINISHED"}
+    assert empty.ops.tactile.mesh_again(edge=0.05) == {"FINISHED"}
     assert empty.context.object["tactile_object"]["status"] == "ok"
 
 

@@ -212,18 +212,18 @@ def test_lengths_in_messages_are_in_the_unit_of_the_scene(extension, empty):
 def test_panels_have_the_scene_s_unit_unless_numbers_in_it_would_be_long(extension, empty):
     units, scene = extension.tactile_addon.touch.units, empty.context.scene
     assert scene.unit_settings.length_unit == "METERS"
-    assert [units.unit_of(scene, size)[0] for size in (5.0, 0.05, 0.012, 0.005)] == ["m", "m", "m", "mm"]
-    record = {"radius": 0.01, "size": 0.08, "tolerance": 2e-4, "height_std": 1e-5, "color_limit": 48.0}
-    assert extension.tactile_addon.touch.units.unit_of_report(record)[0] == "mm"
+    assert [units.unit_of(scene, size)[0] for size in (5.0, 0.05, 0.012, 0.005)] == ["m", "cm", "cm", "mm"]
+    record = {"radius": 0.01, "size": 0.2, "tolerance": 2e-4, "height_std": 1e-5, "color_limit": 48.0}
+    assert extension.tactile_addon.touch.units.unit_of_report(record)[0] == "cm"
     empty.ops.mesh.primitive_cube_add()
     empty.context.object["tactile_object"] = record
     for shown in ("mean_curvature", "deviation"):  # One object has one unit, whatever is shown.
         empty.context.object.tactile_colors = shown
-        assert extension.tactile_addon.scene.shown.unit_of_range(empty.context.object)[1][0] == "mm"
+        assert extension.tactile_addon.scene.shown.unit_of_range(empty.context.object)[1][0] == "cm"
     record["color_limit"] = 48.0
     empty.context.object["tactile_object"] = record
     empty.context.object.tactile_colors = "mean_curvature"
-    assert empty.context.object.tactile_range == pytest.approx(0.048)
+    assert empty.context.object.tactile_range == pytest.approx(0.48)
 
 
 class Layout:

@@ -97,7 +97,7 @@ def test_near_the_edges_of_a_cube_curvatures_are_unknown_and_colors_those_of_the
         ({"tolerance": -1.0}, "The tolerance is a length of 0 or more, got"),
         (
             {"tolerance": 0.01, "noise": 0.02},
-            "The tolerance 0.01 m is below the noise",
+            "The tolerance 1 cm is below the noise",
         ),
         ({"edge": float("nan")}, "The edge length is a length of 0 or more, got"),
         ({"tolerance": 1.0}, 'The tolerance 1 m is larger than 0.4 m, 0.1 of "Sphere": use a smaller one'),
