@@ -28,7 +28,7 @@ from .meshing import MOST_BYTES, WALL, Felt, MeasuredContacts, Mesh, memory_of, 
 from .reference_mesh import ReferenceMesh
 from .samples import indicated
 
-FINE, SHARE = 1.0 / 160.0, 1.0 / 60.0  # Edges that are chosen by the curvature are these shares of the size.
+FINE, SHARE = 1.0 / 160.0, 1.0 / 60.0  # Edges chosen by the curvature are between these shares of the size.
 LIMIT, ROUGH = 1.5, 0.01  # Deviations are above LIMIT tolerances on at most the share ROUGH of the surface.
 # What is off the surface by more tolerances is of something else: a patch ends there, and a contact
 # contradicts the surface if it is off by so many deviations, too.

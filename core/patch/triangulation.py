@@ -89,9 +89,7 @@ def _rim(domain: Domain, size: Size, off: float) -> tuple[Array, float]:
     lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
     corners = domain.corners
     turns = np.arctan2(corners[:, 1], corners[:, 0]) / (2.0 * np.pi) % 1.0
-    corner_lengths = np.interp(
-        places * turns, np.arange(places + 1), lengths
-    )  # where along the boundary corners are
+    at_corners = np.interp(places * turns, np.arange(places + 1), lengths)
 
     def around(at: Array) -> Array:
         """The points of the boundary at these lengths along it."""
@@ -101,23 +99,21 @@ def _rim(domain: Domain, size: Size, off: float) -> tuple[Array, float]:
     along = between * np.arange(RIM_SAMPLES)
     samples = around(along)
     second = np.hypot(*(np.roll(samples, 1, 0) - 2.0 * samples + np.roll(samples, -1, 0)).T)
-    to_corner = np.abs(
-        (along[:, None] - corner_lengths + 0.5 * lengths[-1]) % lengths[-1] - 0.5 * lengths[-1]
-    )
+    to_corner = np.abs((along[:, None] - at_corners + 0.5 * lengths[-1]) % lengths[-1] - 0.5 * lengths[-1])
     sagitta = 0.5 * second[(to_corner > between).all(axis=1)].max(initial=0.0)
     inner_samples = np.arange(5)[:, None, None] / 4.0 * samples
     sizes = size(inner_samples.reshape(-1, 2)).reshape(5, RIM_SAMPLES)
-    finest = float(sizes.min())
-    edges_needed = max(
-        RIM_SAMPLES / 2.0 * math.sqrt(sagitta / off), lengths[-1] / (RIM_SPACING * sizes[-1].min())
-    )
-    count = 4 * math.ceil(min(edges_needed, MOST_RIM_EDGES) / 4.0)
+    spaced = lengths[-1] / (RIM_SPACING * sizes[-1].min())
+    needed = max(RIM_SAMPLES / 2.0 * math.sqrt(sagitta / off), spaced)
+    count = 4 * math.ceil(min(needed, MOST_RIM_EDGES) / 4.0)
     if not len(corners):
-        return around(lengths[-1] / count * np.arange(count)), finest
-    order = np.argsort(corner_lengths)
-    steps = _steps_between(corner_lengths[order], lengths[-1], count)
+        return around(lengths[-1] / count * np.arange(count)), float(sizes.min())
+    order = np.argsort(at_corners)
+    steps = _steps_between(at_corners[order], lengths[-1], count)
     pairs = zip(corners[order], steps, strict=True)
-    return np.vstack([part for corner, at in pairs for part in (corner[None], around(at))]), finest
+    return np.vstack([part for corner, at in pairs for part in (corner[None], around(at))]), float(
+        sizes.min()
+    )
 
 
 def _steps_between(corner_lengths: Array, length: float, count: int) -> list[Array]:

@@ -142,20 +142,17 @@ def fit(
 
     Raises ValueError with a sentence for the user.
     """
-    options |= {"noise": noise or None, "radius": radius or None}
-    start = perf_counter()
+    start, options = perf_counter(), options | {"noise": noise or None, "radius": radius or None}
     contours, unit, of_file, up, strokes = _chosen(contacts, normal_std, all_strokes)
     point, outward = of_file if point is None else point, up if outward is None else outward
     distances: Array | None = None  # By how much curves miss the point.
-    if point is None:
-        point, distances = (
-            core.common_point(contours)
-            if contours
-            else (np.vstack([stroke.points for stroke in strokes]).mean(axis=0), None)
-        )
+    if point is None and contours:
+        point, distances = core.common_point(contours)
+    elif point is None:
+        point = np.vstack([stroke.points for stroke in strokes]).mean(axis=0)
     contours, felt = [core.in_running_order(c, point) for c in contours], [*contours, *strokes]
     reconstruct = partial(core.reconstruct, point, contours, strokes=strokes, **options)
-    unknown = outward is None and not any(c.normals is not None for c in felt)
+    unknown = outward is None and all(c.normals is None for c in felt)
     result = _on_a_side(reconstruct, outward, unknown, flip)
     require_single("patch", result.radius, result.frame.origin)
     axes = reference_axes(result.frame.axes[:, 2])
@@ -172,11 +169,9 @@ def fit(
         "vertices": 0,
         **measures(result),
         "suggested_plane": suggestion_report(result, axes),
+        **({} if distances is None else {"misses": distances.tolist()}),
     }
-    if distances is not None:
-        report["misses"] = distances.tolist()
-    report["seconds"] = {"fit": perf_counter() - start}
-    return Touched(None, result, report)
+    return Touched(None, result, report | {"seconds": {"fit": perf_counter() - start}})
 
 
 def _chosen(contacts: core.Contacts, normal_std: float, all_strokes: bool) -> core.Contacts:
